@@ -1,0 +1,56 @@
+# The verbs a person types. Two of them do everything on a fresh machine: `make fly` and `make test`.
+
+PYTHON ?= python3
+VENV := .venv/bin
+SETUP := @$(PYTHON) tools/setup/setup.py
+# The virtual environment without the compiled core, for what does not need it.
+ENVIRONMENT := $(SETUP) environment
+
+.PHONY: help setup fly test pio gains firmware format lint pins clean
+
+help: ## List these verbs
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+setup: ## Make or update .venv and the compiled core
+	$(SETUP)
+
+fly: ## Fly 60 s in simulation and leave log, report and summary in out/ (ARGS="--heading 90")
+	$(SETUP)
+	@$(VENV)/strix fly --out out $(ARGS)
+
+test: ## Run every test: the Unity suites, then the Python tests
+	$(ENVIRONMENT)
+	@$(VENV)/python tools/setup/run_tests.py
+
+pio: ## Run PlatformIO, with its registry or without (ARGS="test -e native -f test_math")
+	$(ENVIRONMENT)
+	@$(VENV)/python tools/setup/pio.py $(ARGS)
+
+gains: ## Compute the controller's gains into include/
+	$(SETUP)
+	@$(VENV)/strix gains $(ARGS)
+
+firmware: ## Build the firmware for the Teensy 4.1 (needs PlatformIO's registry)
+	$(ENVIRONMENT)
+	@$(VENV)/python tools/setup/pio.py run -e teensy41
+
+format: ## Lay out C++ and Python as .clang-format and ruff say
+	$(ENVIRONMENT)
+	@git ls-files --cached --others --exclude-standard '*.h' '*.cpp' | xargs $(VENV)/clang-format -i
+	@$(VENV)/ruff format tools
+	@$(VENV)/ruff check --fix tools
+
+lint: ## Check layout, Python types and, if clang-tidy is installed, the C++
+	$(SETUP)
+	@git ls-files --cached --others --exclude-standard '*.h' '*.cpp' | xargs $(VENV)/clang-format --dry-run -Werror
+	@$(VENV)/ruff format --check tools
+	@$(VENV)/ruff check tools
+	@cd tools && ../$(VENV)/mypy
+	@if command -v clang-tidy > /dev/null; then clang-tidy -p build/core --quiet tools/strix/core/*.cpp; \
+	else echo "clang-tidy is not installed: C++ not checked"; fi
+
+pins: ## Write tools/requirements.txt anew from tools/pyproject.toml
+	@$(PYTHON) tools/setup/pin.py
+
+clean: ## Remove everything that these verbs made, except out/
+	rm -rf .venv .pio build tools/strix/_core.*

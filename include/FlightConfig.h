@@ -1,0 +1,32 @@
+/// The aircraft that this repository flies, and everything chosen for it.
+#pragma once
+
+#include "FlightSoftwareConfig.h"
+#include "gains/Quad5in.h"
+#include "missions/FirstFlight.h"
+#include "vehicles/Quad5in.h"
+
+namespace strix {
+
+/// Magnetic declination where you fly, east positive: look it up for your field.
+constexpr float kDeclination = 4.0F * kDegToRad;
+
+/// Age of an MTK3333's fix when its sentence has arrived; ArduPilot assumes the same of a receiver
+/// it does not know.
+constexpr Micros kGpsDelay = 100'000;
+
+/// Configuration of one airframe with the defaults of every library.
+[[nodiscard]] inline FlightSoftwareConfig flightConfig(const Vehicle& vehicle, const Gains& gains,
+                                                       const Mission& mission, float declination) {
+  FlightSoftwareConfig config{vehicle, gains, mission};
+  config.declination = declination;
+  config.navigation.gpsDelay = kGpsDelay;
+  return config;
+}
+
+/// What src/main.cpp flies.
+[[nodiscard]] inline FlightSoftwareConfig flightConfig() {
+  return flightConfig(kQuad5in, kQuad5inGains, kFirstFlight, kDeclination);
+}
+
+}  // namespace strix

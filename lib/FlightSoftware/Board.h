@@ -1,0 +1,44 @@
+/// What the flight software asks of a board, and all it ever sees of one.
+///
+/// A Board is a class with the members below (a compile-time interface: no virtual call, nothing to
+/// inherit). There are four kinds: the Teensy (src/board), the simulator (tools/strix/core), the log
+/// replay and the emulated Cortex-M7. The flight code is a pure function of what they return.
+///
+///   static constexpr const char* kName; for the log, e.g. "Teensy 4.1"
+///   std::uint32_t bootId();             differs between two starts, as far as the board can tell
+///   Micros micros();                    the clock; read once a pass
+///   SensorSet begin();                  starts buses and devices; returns those that answered.
+///                                       Called once by setup(); may take up to 2 s.
+///   bool readImu(ImuRaw&);              true and filled when a reading newer than the last one is
+///   bool readMag(MagRaw&);              there. Never waits for one; the time each may take at worst
+///   bool readAlt(AltRaw&);              is the board's stated bound.
+///   bool readGps(GpsRaw&);
+///   PilotSwitches readPilot();          the pilot's switches as they are now
+///   void writeEsc(const EscCommands&);  M1..M4 in the vehicle's command unit; takes effect at the
+///                                       next ESC frame
+///   Card& card();                       the log's block device (lib/Logger/BlockDevice.h)
+///   using Card = ...;
+#pragma once
+
+#include "RawSamples.h"
+#include "Vehicle.h"
+
+namespace strix {
+
+/// Switch positions. Arming is an edge the state machine looks for, not a level.
+struct PilotSwitches {
+  bool arm = false;
+  bool kill = false;   ///< motors off now, whatever else
+  bool start = false;  ///< begin the mission
+};
+
+/// Devices that answered with the right identity at start.
+struct SensorSet {
+  bool imu = false;
+  bool mag = false;
+  bool alt = false;
+  bool gps = false;
+  bool card = false;
+};
+
+}  // namespace strix

@@ -1,0 +1,47 @@
+/// Conditions that need time to be believed: touch-down and standstill.
+#pragma once
+
+#include "Mathpk.h"
+
+namespace strix {
+
+/// True once a sign has been there without a break for a while.
+class Persistence {
+ public:
+  explicit Persistence(Micros duration) : duration_(duration) {}
+
+  bool update(Micros now, bool present) {
+    if (!present) {
+      since_ = now;
+      return held_ = false;
+    }
+    held_ = held_ || elapsed(now, since_) >= duration_;
+    return held_;
+  }
+  void reset(Micros now) {
+    since_ = now;
+    held_ = false;
+  }
+  [[nodiscard]] bool held() const { return held_; }
+
+ private:
+  Micros duration_;
+  Micros since_ = 0;
+  bool held_ = false;
+};
+
+/// On the ground while landing: the aircraft does not sink although little thrust is left.
+struct TouchDownConfig {
+  float thrustFraction = 0.6F;   ///< of the weight
+  float sinkRate = 0.15F;        ///< m/s
+  Micros duration = 400'000;
+};
+
+/// Nothing moves: what arming asks for. Free fall is not rest: the specific force must be g long.
+struct StandstillConfig {
+  float rate = 0.1F;             ///< rad/s
+  float acceleration = 0.5F;     ///< m/s^2, | |a| - g |
+  Micros duration = 500'000;
+};
+
+}  // namespace strix

@@ -1,0 +1,70 @@
+/// Flight types to log records. What is logged is chosen in FlightSoftware.h; how it looks in the
+/// file is Logger/Topics.def.
+#pragma once
+
+#include "Board.h"
+#include "Controller.h"
+#include "DataTypes.h"
+#include "ESKF.h"
+#include "Motors.h"
+#include "Sensors.h"
+
+namespace strix {
+
+[[nodiscard]] inline topic::SensorCombined toRecord(LogTime time, LogTime sampled,
+                                                    const ImuRaw& raw) {
+  return {time, sampled, toArray(raw.accel), toArray(raw.gyro), raw.temperature};
+}
+
+[[nodiscard]] inline topic::SensorMag toRecord(LogTime time, LogTime sampled, const MagRaw& raw) {
+  return {time, sampled, toArray(raw.field)};
+}
+
+[[nodiscard]] inline topic::SensorBaro toRecord(LogTime time, LogTime sampled, const AltRaw& raw) {
+  return {time, sampled, raw.pressure, raw.temperature};
+}
+
+[[nodiscard]] inline topic::VehicleGpsPosition toRecord(LogTime time, LogTime sampled,
+                                                        const GpsRaw& raw) {
+  return {time,          sampled,       raw.latitude, raw.longitude, raw.altitude,
+          raw.speedKnots, raw.courseDeg, raw.hdop,     raw.fix,       raw.satellites};
+}
+
+[[nodiscard]] inline topic::ManualControlSwitches toRecord(LogTime time,
+                                                           const PilotSwitches& pilot) {
+  return {time, switchPosition(pilot.arm), switchPosition(pilot.kill), switchPosition(pilot.start)};
+}
+
+[[nodiscard]] inline topic::EstimatorAidSource toRecord(LogTime time, const Innovation& innovation) {
+  return {time,           innovation.value, innovation.variance,
+          innovation.nis, innovation.count, innovation.rejected};
+}
+
+[[nodiscard]] inline topic::EstimatorStd toRecord(LogTime time, const Matrix9f& covariance) {
+  topic::EstimatorStd record{time, {}};
+  for (int i = 0; i < 9; ++i) {
+    record.std_dev[static_cast<std::size_t>(i)] = squareRoot(covariance(i, i));
+  }
+  return record;
+}
+
+[[nodiscard]] inline GncRecords toRecords(LogTime time, const VehicleState& estimate,
+                                          const Reference& reference, const Controller& controller,
+                                          const Motors& motors, const topic::ControlTick& tick) {
+  const Vector3f& p = estimate.positionNed;
+  const Vector3f& v = estimate.velocityNed;
+  const Wrench& wanted = controller.getControl();
+  const Wrench& achieved = motors.achieved();
+  return {{time, toArray(estimate.attitude)},
+          {time, toArray(estimate.rateBody)},
+          {time, p.x(), p.y(), p.z(), v.x(), v.y(), v.z(), yawOf(estimate.attitude)},
+          {time, toArray(reference.positionNed), toArray(reference.velocityNed), reference.yaw,
+           reference.yawRate},
+          {time, toArray(controller.attitudeReference())},
+          {time, wanted.thrust, toArray(wanted.torque)},
+          {time, achieved.thrust, toArray(achieved.torque)},
+          {time, kMotorCount, motors.commands()},
+          tick};
+}
+
+}  // namespace strix

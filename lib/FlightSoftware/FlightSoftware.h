@@ -1,0 +1,297 @@
+/// The flight software: everything that runs on the aircraft, for any Board.
+#pragma once
+
+#include "Board.h"
+#include "Conditions.h"
+#include "Controller.h"
+#include "Detectors.h"
+#include "ESKF.h"
+#include "FiniteStateMachine.h"
+#include "FlightLog.h"
+#include "FlightSoftwareConfig.h"
+#include "Guidance.h"
+#include "Logger.h"
+#include "Motors.h"
+#include "Sensors.h"
+#include "Version.h"
+
+namespace strix {
+
+template <class Board>
+class FlightSoftware {
+ public:
+  FlightSoftware(Board& board, const FlightSoftwareConfig& config)
+      : board_(board),
+        config_(config),
+        sensors_(board, config.sensors),
+        startCalibration_(config.startCalibration),
+        eskf_(config.navigation),
+        guidance_(config.mission, config.guidance),
+        controller_(config.vehicle, config.gains, config.control),
+        motors_(config.vehicle),
+        logger_(board.card()),
+        touchDown_(config.touchDown.duration),
+        standstill_(config.standstill.duration) {}
+
+  /// Starts the board and the log. Start-up calibration follows in the loop, in state BOOT.
+  void setup() {
+    found_ = board_.begin();
+    const Micros now = board_.micros();
+    lastPass_ = now;
+    const LogTime time = clock_.update(now);
+    sensors_.start(now);
+    controller_.reset(now);
+    motors_.disarm();
+    motors_.writeESC(board_);
+    standstill_.reset(now);
+    touchDown_.reset(now);
+    logger_.begin(time, {config_.vehicle.name, Board::kName, kVersion, kGitCommit, board_.bootId()});
+  }
+
+  /// One pass. Nothing in it waits.
+  void loop() {
+    const Micros now = board_.micros();  // the one time stamp of this pass
+    const LogTime time = clock_.update(now);
+
+    if (sensors_.imuUpdate(now)) {
+      const ImuRaw& raw = sensors_.getIMUMeas();
+      const ImuSample imu = sensors_.processIMUMeas(raw);
+      if (calibrating()) {
+        startCalibration_.addImu(imu.sampled, imu.accel, imu.gyro);
+      } else {
+        eskf_.predict(imu.accel, imu.gyro, imu.sampled);
+        eskf_.updateTiltMeas(imu.accel);
+      }
+      observeStandstill(now, imu);
+      logger_.logIMU(toRecord(time, clock_.at(raw.sampled), raw));
+      logAid<AidSource::Tilt>(time, eskf_.tiltInnovation());
+    }
+    if (sensors_.magUpdate(now)) {
+      const MagRaw& raw = sensors_.getMagMeas();
+      const Vector3f field = sensors_.processMagMeas(raw);
+      if (calibrating()) {
+        startCalibration_.addMag(field);
+      } else {
+        eskf_.updateMagMeas(field, now);
+      }
+      logger_.logMag(toRecord(time, clock_.at(raw.sampled), raw));
+      logAid<AidSource::Magnetometer>(time, eskf_.magInnovation());
+    }
+    if (sensors_.altUpdate(now)) {
+      const AltRaw& raw = sensors_.getAltMeas();
+      if (calibrating()) {
+        startCalibration_.addPressure(raw.pressure);
+      } else {
+        eskf_.updateAltMeas(sensors_.processAltMeas(raw), now);
+      }
+      logger_.logAlt(toRecord(time, clock_.at(raw.sampled), raw));
+      logAid<AidSource::Altimeter>(time, eskf_.altInnovation());
+    }
+    if (sensors_.gpsUpdate(now)) {
+      const GpsRaw& raw = sensors_.getGPSMeas();
+      if (sensors_.gpsUsable(raw)) {
+        if (!motors_.armed()) averageOrigin(raw);
+        if (!calibrating()) {
+          const GpsSample gps = sensors_.processGPSMeas(raw);
+          eskf_.updateGPSMeas(gps.positionNed, gps.velocityNed);
+        }
+      }
+      logger_.logGPS(toRecord(time, clock_.at(raw.sampled), raw));
+      logAid<AidSource::Gps>(time, eskf_.gpsInnovation());
+    }
+    eskf_.injectError();
+    if (calibrating() && startCalibration_.done()) finishCalibration(time);
+
+    const VehicleState estimate = eskf_.state();
+    updateStateMachine(now, time, estimate);
+    const Reference& reference = guidance_.update(now);
+    if (controller_.updateControl(now, reference, estimate)) {
+      motors_.commandControl(fsm_.getControlFlag() ? controller_.getControl() : Wrench::none());
+      motors_.writeESC(board_);
+      controller_.setAchieved(motors_.achieved());
+      logger_.logGNC(toRecords(time, estimate, reference, controller_, motors_, tick(now, time)));
+    }
+    if (stdLog_.run(now)) logger_.log(toRecord(time, eskf_.covariance()));
+    logger_.write(time);
+    logger_.flush(time);
+    lastPass_ = now;
+  }
+
+  [[nodiscard]] const FiniteStateMachine& stateMachine() const { return fsm_; }
+  [[nodiscard]] const ESKF& estimator() const { return eskf_; }
+  [[nodiscard]] const Sensors<Board>& sensors() const { return sensors_; }
+  [[nodiscard]] const Motors& motors() const { return motors_; }
+  [[nodiscard]] const Controller& controller() const { return controller_; }
+  [[nodiscard]] const Guidance& guidance() const { return guidance_; }
+  [[nodiscard]] Logger<typename Board::Card>& logger() { return logger_; }
+
+  /// Periods of any task missed since the start.
+  [[nodiscard]] std::uint32_t overruns() const {
+    return sensors_.overruns() + controller_.overruns();
+  }
+
+ private:
+  [[nodiscard]] bool calibrating() const { return fsm_.state() == FlightState::Boot; }
+
+  /// Aligns the filter with what the still aircraft showed.
+  void finishCalibration(LogTime time) {
+    const StartCalibration& found = startCalibration_;
+    const Alignment alignment = alignStill(found.accel(), found.mag(), config_.declination);
+    const float gravity = found.accel().norm();
+    sensors_.setStartCalibration(found.gyroBias(), found.groundPressure());
+    eskf_.initialize(alignment, gravity);
+    const GeoPoint& origin = sensors_.origin();
+    logger_.log(topic::EstimatorStart{time, toArray(found.gyroBias()), gravity,
+                                      toArray(alignment.magReference), found.groundPressure(),
+                                      origin.latitude, origin.longitude,
+                                      toArray(alignment.attitude)});
+  }
+
+  /// On the ground every fix makes the origin better; it stands still once the motors are armed.
+  void averageOrigin(const GpsRaw& raw) {
+    origin_.add(Sensors<Board>::geoPoint(raw));
+    sensors_.setOrigin(origin_.origin());
+  }
+
+  void observeStandstill(Micros now, const ImuSample& imu) {
+    const float excess = imu.accel.norm() - kGravity;
+    standstill_.update(now, imu.gyro.norm() < config_.standstill.rate &&
+                                excess < config_.standstill.acceleration &&
+                                excess > -config_.standstill.acceleration);
+  }
+
+  void updateStateMachine(Micros now, LogTime time, const VehicleState& estimate) {
+    const PilotSwitches pilot = board_.readPilot();
+    const ConditionSet failures = preArmFailures(now, pilot, estimate);
+    const ConditionSet conditions = conditionsNow(now, pilot, estimate, failures);
+    const Transition* row = fsm_.update(conditions);
+    if (row != nullptr) {
+      entered_ = now;
+      touchDown_.reset(now);
+      guidance_.enter(fsm_.state(), now, estimate);
+      if (fsm_.getMotorFlag() && !motors_.armed()) motors_.arm();
+      if (!fsm_.getMotorFlag() && motors_.armed()) motors_.disarm();
+      say(time, *row, failures);
+    }
+    if (row != nullptr || stateLog_.due(now)) {
+      stateLog_.postpone(now);
+      logger_.log(topic::FlightState{time, conditions, failures,
+                                     static_cast<std::uint8_t>(fsm_.state()),
+                                     fsm_.getControlFlag(), fsm_.getMotorFlag(),
+                                     fsm_.getCriticalErrorFlag()});
+    }
+    logSwitches(now, time, pilot);
+  }
+
+  /// Everything that forbids arming now.
+  [[nodiscard]] ConditionSet preArmFailures(Micros now, const PilotSwitches& pilot,
+                                            const VehicleState& estimate) const {
+    ConditionSet set = 0;
+    const auto refuseIf = [&set](bool bad, ConditionSet bit) { set |= bad ? bit : 0U; };
+    refuseIf(calibrating(), prearm::kNotCalibrated);
+    refuseIf(!found_.imu || !sensors_.imuFresh(now), prearm::kImu);
+    refuseIf(!found_.mag || !sensors_.magFresh(now), prearm::kMag);
+    refuseIf(!found_.alt || !sensors_.altFresh(now), prearm::kAlt);
+    refuseIf(!sensors_.gpsFresh(now) || !sensors_.gpsUsable(sensors_.getGPSMeas()), prearm::kGps);
+    refuseIf(origin_.count() < config_.originFixes, prearm::kOrigin);
+    refuseIf(!eskf_.healthy(), prearm::kEstimator);
+    refuseIf(!(cosTilt(estimate.attitude) > cosine(config_.armTilt)), prearm::kTilt);
+    refuseIf(!standstill_.held(), prearm::kMoving);
+    refuseIf(pilot.kill, prearm::kKillSwitch);
+    refuseIf(pilot.start, prearm::kStartSwitch);
+    refuseIf(!found_.card || logger_.failed(), prearm::kLog);
+    refuseIf(!sensors_.mountingValid(), prearm::kMounting);
+    refuseIf(!isFlyable(config_.mission, config_.fence), prearm::kMission);
+    refuseIf(!config_.fence.contains(estimate.positionNed), prearm::kFence);
+    return set;
+  }
+
+  [[nodiscard]] ConditionSet conditionsNow(Micros now, const PilotSwitches& pilot,
+                                           const VehicleState& estimate, ConditionSet failures) {
+    ConditionSet set = guidance_.conditions(now, estimate);
+    const auto setIf = [&set](bool present, ConditionSet bit) { set |= present ? bit : 0U; };
+    setIf(startCalibration_.done(), condition::kCalibrated);
+    setIf(pilot.arm && !armSwitchWasOn_, condition::kArmEdge);
+    armSwitchWasOn_ = pilot.arm;
+    setIf(!pilot.arm, condition::kDisarm);
+    setIf(failures != 0, condition::kPreArmFailure);
+    setIf(pilot.start, condition::kStart);
+    setIf(elapsed(now, entered_) >= config_.armedTimeout, condition::kArmedTooLong);
+    setIf(touchDown(now, estimate), condition::kTouchDown);
+    setIf(pilot.kill, condition::kKill);
+    setIf(!(cosTilt(estimate.attitude) > 0.0F), condition::kUpset);
+    setIf(!config_.fence.contains(estimate.positionNed), condition::kOutsideFence);
+    setIf(!sensors_.imuFresh(now), condition::kImuLost);
+    setIf(!eskf_.healthy(), condition::kEstimatorUnhealthy);
+    return set;
+  }
+
+  [[nodiscard]] bool touchDown(Micros now, const VehicleState& estimate) {
+    const float weight = config_.vehicle.mass * kGravity;
+    return touchDown_.update(
+        now, fsm_.state() == FlightState::Land &&
+                 motors_.achieved().thrust < config_.touchDown.thrustFraction * weight &&
+                 estimate.velocityNed.z() < config_.touchDown.sinkRate);
+  }
+
+  /// Tells the pilot and the log what happened, and why arming was refused.
+  void say(LogTime time, const Transition& row, ConditionSet failures) {
+    const bool critical = row.to == FlightState::Safe;
+    logger_.logText(critical ? ulog::LogLevel::Error : ulog::LogLevel::Info, time, row.said);
+    if (row.to != FlightState::Armed && (row.when & condition::kArmEdge) != 0) {
+      logger_.logText(ulog::LogLevel::Warning, time, firstRefusal(failures));
+    }
+  }
+
+  [[nodiscard]] topic::ControlTick tick(Micros now, LogTime time) const {
+    StateHash hash;
+    const VehicleState& s = eskf_.state();
+    hash.add(s.positionNed);
+    hash.add(s.velocityNed);
+    for (const float element : toArray(s.attitude)) hash.add(element);
+    hash.add(eskf_.covariance());
+    hash.add(controller_.error());
+    hash.add(static_cast<std::uint32_t>(fsm_.state()));
+    for (const float command : motors_.commands()) hash.add(command);
+    return {time, hash.value(), elapsed(now, lastPass_), overruns()};
+  }
+
+  template <AidSource kSource>
+  void logAid(LogTime time, const Innovation& innovation) {
+    logger_.template logAid<kSource>(toRecord(time, innovation));
+  }
+
+  void logSwitches(Micros now, LogTime time, const PilotSwitches& pilot) {
+    const bool changed = pilot.arm != loggedPilot_.arm || pilot.kill != loggedPilot_.kill ||
+                         pilot.start != loggedPilot_.start;
+    if (!changed && !switchLog_.due(now)) return;
+    switchLog_.postpone(now);
+    loggedPilot_ = pilot;
+    logger_.log(toRecord(time, pilot));
+  }
+
+  Board& board_;
+  FlightSoftwareConfig config_;
+  Sensors<Board> sensors_;
+  StartCalibration startCalibration_;
+  OriginAverage origin_;
+  ESKF eskf_;
+  FiniteStateMachine fsm_;
+  Guidance guidance_;
+  Controller controller_;
+  Motors motors_;
+  Logger<typename Board::Card> logger_;
+  LogClock clock_;
+  SensorSet found_;
+  Persistence touchDown_;
+  Persistence standstill_;
+  PeriodicTask stateLog_{periodFromHz(10)};
+  PeriodicTask switchLog_{periodFromHz(1)};
+  PeriodicTask stdLog_{periodFromHz(50)};
+  PilotSwitches loggedPilot_;
+  Micros entered_ = 0;   ///< when the present state began
+  Micros lastPass_ = 0;
+  bool armSwitchWasOn_ = true;  ///< so that a switch held through power-up is no edge
+};
+
+}  // namespace strix

@@ -1,0 +1,32 @@
+/// Everything that is chosen for one aircraft, in one value. include/FlightConfig.h makes it.
+#pragma once
+
+#include "Controller.h"
+#include "Detectors.h"
+#include "Guidance.h"
+#include "NavigationConfig.h"
+#include "Sensors.h"
+#include "StartCalibration.h"
+#include "Vehicle.h"
+
+namespace strix {
+
+struct FlightSoftwareConfig {
+  const Vehicle& vehicle;
+  const Gains& gains;
+  Mission mission;
+  SensorConfig sensors{};
+  StartCalibrationConfig startCalibration{};
+  NavigationConfig navigation{};
+  GuidanceConfig guidance{};
+  ControlLimits control{};
+  Fence fence{};
+  TouchDownConfig touchDown{};
+  StandstillConfig standstill{};
+  float declination = 0.0F;              ///< rad, east positive: magnetic to true north
+  std::uint32_t originFixes = 50;        ///< GPS fixes averaged before arming is allowed
+  float armTilt = 20.0F * kDegToRad;     ///< rad, most tilt at arming
+  Micros armedTimeout = 30'000'000;      ///< armed without take-off
+};
+
+}  // namespace strix

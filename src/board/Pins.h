@@ -1,0 +1,39 @@
+/// Which wire goes to which Teensy 4.1 pin. The same table with the wiring is in docs/board.md.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "Vehicle.h"
+
+namespace strix::pins {
+
+/// ESC signal M1..M4: FlexPWM3.1B, 2.3B, 3.1A and 2.3A, which share no counter with another use.
+constexpr std::array<std::uint8_t, kMotorCount> kEsc{28, 37, 29, 36};
+
+struct I2cPins {
+  std::uint8_t sda;
+  std::uint8_t scl;
+};
+
+/// The IMU has a bus of its own (LPI2C1, Wire): a magnetometer that holds its lines low must not
+/// take the attitude with it.
+constexpr I2cPins kImuBus{18, 19};
+constexpr std::uint8_t kImuDataReady = 20;
+
+/// Magnetometer and barometer (LPI2C3, Wire1).
+constexpr I2cPins kSlowBus{17, 16};
+
+/// GPS: Serial2. Serial1 (0, 1) is left for a receiver, Serial8 (34, 35) for telemetry.
+constexpr std::uint8_t kGpsRx = 7;
+constexpr std::uint8_t kGpsTx = 8;
+
+/// Pilot's switches, each between its pin and ground, with the Teensy's pull-up (about 22 kOhm).
+/// Arm and start close to switch on, so a broken wire is off. Kill is a loop that is closed in
+/// normal use: a broken wire, or a plug pulled out, kills. A kill that can fail without being seen
+/// is none; the price is that a loose kill wire ends the flight, so use a locking plug.
+constexpr std::uint8_t kArmSwitch = 30;
+constexpr std::uint8_t kKillSwitch = 31;
+constexpr std::uint8_t kStartSwitch = 32;
+
+}  // namespace strix::pins

@@ -1,0 +1,160 @@
+#include "SdCard.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+namespace strix {
+
+namespace {
+
+// The emulated Teensy has no FIFO transfers; the real one waits for DMA, so it does not use it.
+#ifdef STRIX_SD_DMA
+constexpr std::uint8_t kTransfer = DMA_SDIO;
+#else
+constexpr std::uint8_t kTransfer = FIFO_SDIO;
+#endif
+
+constexpr char kPrefix[] = "log_";
+constexpr char kSuffix[] = ".ulg";
+
+struct FileName {
+  explicit FileName(std::uint32_t number) {
+    std::snprintf(text, sizeof text, "%s%04u%s", kPrefix, static_cast<unsigned>(number), kSuffix);
+  }
+  char text[24] = {};
+};
+
+/// 0 when it is not the name of a log.
+std::uint32_t numberOf(const char* name) {
+  if (std::strncmp(name, kPrefix, sizeof kPrefix - 1) != 0) return 0;
+  char* end = nullptr;
+  const unsigned long number = std::strtoul(name + sizeof kPrefix - 1, &end, 10);
+  return std::strcmp(end, kSuffix) == 0 ? static_cast<std::uint32_t>(number) : 0;
+}
+
+}  // namespace
+
+bool SdCard::begin() {
+  writable_ = false;
+  if (!sd_.begin(SdioConfig(kTransfer))) return false;
+  const std::uint32_t newest = newestLogNumber();
+  if (newest >= kMaxLogNumber) return false;
+  if (newest > 0) cutToWritten(newest);
+  if (!allocate(newest + 1)) return false;
+  logNumber_ = newest + 1;
+  held_ = kNone;
+  writable_ = true;
+  return true;
+}
+
+std::uint32_t SdCard::newestLogNumber() {
+  std::uint32_t newest = 0;
+  FsFile root;
+  FsFile entry;
+  if (!root.open("/", O_RDONLY)) return 0;
+  while (entry.openNext(&root, O_RDONLY)) {
+    char name[24] = {};
+    entry.getName(name, sizeof name);
+    newest = std::max(newest, numberOf(name));
+    entry.close();
+  }
+  return newest;
+}
+
+/// Without finish a file keeps its allocated size. The log is written in order onto erased sectors,
+/// so its end is found by halving; where a card did not erase, the file is cut later, never
+/// earlier.
+void SdCard::cutToWritten(std::uint32_t number) {
+  FsFile file;
+  if (!file.open(FileName(number).text, O_RDWR)) return;
+  std::uint32_t first = 0;
+  std::uint32_t last = 0;
+  const std::uint64_t size = file.fileSize();
+  const bool whole = size >= kLeastFileSize && file.contiguousRange(&first, &last);
+  if (whole && isBlank(last)) {
+    std::uint32_t written = first;
+    std::uint32_t blank = last;
+    while (written < blank) {
+      const std::uint32_t middle = written + (blank - written) / 2;
+      if (isBlank(middle)) {
+        blank = middle;
+      } else {
+        written = middle + 1;
+      }
+    }
+    file.truncate(static_cast<std::uint64_t>(blank - first) * kSectorSize);
+  }
+  file.close();
+}
+
+/// Erased sectors read as all zeros or all ones, by the card's choice. No sector of a log does.
+bool SdCard::isBlank(std::uint32_t sector) {
+  if (!sd_.card()->readSector(sector, sector_.data())) return false;
+  const std::uint8_t filler = sector_.front();
+  return (filler == 0x00 || filler == 0xFF) &&
+         std::all_of(sector_.begin(), sector_.end(),
+                     [filler](std::uint8_t byte) { return byte == filler; });
+}
+
+bool SdCard::allocate(std::uint32_t number) {
+  if (!file_.open(FileName(number).text, O_RDWR | O_CREAT | O_EXCL)) return false;
+  std::uint64_t size = std::min<std::uint64_t>(kFileSize, kMostClusters * sd_.bytesPerCluster());
+  while (size >= kLeastFileSize && !file_.preAllocate(size)) size /= 2;
+  std::uint32_t last = 0;
+  if (size < kLeastFileSize || !makeValid(size) || !file_.contiguousRange(&firstSector_, &last)) {
+    file_.remove();
+    return false;
+  }
+  sectors_ = static_cast<std::uint32_t>(size / kSectorSize);
+  if (last - firstSector_ + 1 < sectors_ || !sd_.card()->syncDevice()) return false;
+  // Erased sectors are written faster, and show where a log ends that was cut off by the battery. A
+  // card that cannot erase, or not within a second, does without.
+  (void)sd_.card()->erase(firstSector_, last);
+  return true;
+}
+
+/// An exFAT file is valid up to where it was written, and reads as zeros behind, whatever the card
+/// holds: what goes to it by the sector would be lost. Writing the last sector makes all of it
+/// valid. SdFat refuses to seek there, so the position is set: the first write shows the number of
+/// the first cluster, and the clusters follow each other.
+bool SdCard::makeValid(std::uint64_t size) {
+  if (sd_.fatType() != FAT_TYPE_EXFAT) return true;
+  sector_.fill(0);
+  if (file_.write(sector_.data(), sector_.size()) != sector_.size()) return false;
+  fspos_t position{};
+  file_.fgetpos(&position);
+  position.cluster += static_cast<std::uint32_t>((size - 1) / sd_.bytesPerCluster());
+  position.position = size - kSectorSize;
+  file_.fsetpos(&position);
+  return file_.write(sector_.data(), sector_.size()) == sector_.size() && file_.sync();
+}
+
+bool SdCard::busy() { return writable_ && sd_.card()->isBusy(); }
+
+bool SdCard::writeSector(std::uint32_t index, const std::uint8_t (&data)[kSectorSize]) {
+  if (!writable_ || index >= sectors_) return false;
+  const bool next = held_ == kNone ? index == 0 : index == held_ + 1;
+  if (!next && index != held_) return false;
+  if (next && !flushHeld()) return false;
+  std::copy(std::begin(data), std::end(data), sector_.begin());
+  held_ = index;
+  return true;
+}
+
+bool SdCard::flushHeld() {
+  if (held_ != kNone) writable_ = sd_.card()->writeSector(firstSector_ + held_, sector_.data());
+  return writable_;
+}
+
+bool SdCard::sync(std::uint32_t /*length*/) { return writable_; }
+
+bool SdCard::finish(std::uint32_t length) {
+  if (!writable_) return false;
+  const bool written = flushHeld() && sd_.card()->syncDevice();
+  writable_ = false;
+  return written && file_.truncate(length) && file_.close();
+}
+
+}  // namespace strix

@@ -1,0 +1,63 @@
+/// The aircraft's Board (lib/FlightSoftware/Board.h): a Teensy 4.1 with its sensors, ESCs and card.
+#pragma once
+
+#include <cstdint>
+
+#include "Board.h"
+#include "RawSamples.h"
+#include "Vehicle.h"
+
+#include "BaroBmp390.h"
+#include "EscPwm.h"
+#include "GpsMtk3333.h"
+#include "I2cBus.h"
+#include "ImuIcm20649.h"
+#include "MagLis2mdl.h"
+#include "Pins.h"
+#include "SdCard.h"
+#include "Switch.h"
+
+namespace strix {
+
+/// What each call may take at worst, and why, stands at the device's own class; docs/board.md has
+/// the table.
+class TeensyBoard {
+ public:
+  using Card = SdCard;
+  static constexpr const char* kName = "Teensy 4.1";
+
+  /// The ESCs first, so that they see `off` while the rest starts. Takes 1 s.
+  SensorSet begin();
+
+  /// Log number and start-up jitter: differs between two starts with or without a card.
+  [[nodiscard]] std::uint32_t bootId() const { return bootId_; }
+
+  [[nodiscard]] Micros micros() const { return ::micros(); }
+
+  [[nodiscard]] bool readImu(ImuRaw& out) { return imu_.read(out); }
+  [[nodiscard]] bool readMag(MagRaw& out) { return mag_.read(out); }
+  [[nodiscard]] bool readAlt(AltRaw& out) { return baro_.read(out); }
+  [[nodiscard]] bool readGps(GpsRaw& out) { return gps_.read(out); }
+
+  [[nodiscard]] PilotSwitches readPilot();
+
+  void writeEsc(const EscCommands& commands) { esc_.write(commands); }
+
+  [[nodiscard]] SdCard& card() { return card_; }
+
+ private:
+  EscPwm esc_;
+  Switch arm_{pins::kArmSwitch, false};
+  Switch kill_{pins::kKillSwitch, true};
+  Switch start_{pins::kStartSwitch, false};
+  I2cBus imuBus_{Wire, IMXRT_LPI2C1_ADDRESS, pins::kImuBus};
+  I2cBus slowBus_{Wire1, IMXRT_LPI2C3_ADDRESS, pins::kSlowBus};
+  ImuIcm20649 imu_{imuBus_};
+  MagLis2mdl mag_{slowBus_};
+  BaroBmp390 baro_{slowBus_};
+  GpsMtk3333 gps_{Serial2};
+  SdCard card_;
+  std::uint32_t bootId_ = 0;
+};
+
+}  // namespace strix

@@ -1,0 +1,7 @@
+/// The parts of this suite; test_main.cpp runs them.
+#pragma once
+
+void runRingBufferTests();
+void runSectorStreamTests();
+void runULogTests();
+void runCardTests();

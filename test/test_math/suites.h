@@ -1,0 +1,7 @@
+/// The parts of this suite; test_math.cpp runs them.
+#pragma once
+
+void runDeterministicTests();
+void runQuaternionTests();
+void runRotationTests();
+void runTimeTests();

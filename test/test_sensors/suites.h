@@ -1,0 +1,7 @@
+/// The parts of this suite; test_sensors.cpp runs them.
+#pragma once
+
+void runRateTests();
+void runProcessingTests();
+void runGeodesyTests();
+void runStartCalibrationTests();

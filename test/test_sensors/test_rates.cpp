@@ -1,0 +1,214 @@
+// When sensors are asked, what happens when they are silent, and that no reading is made up.
+#include <unity.h>
+
+#include "FakeBoard.h"
+#include "Sensors.h"
+#include "suites.h"
+
+using namespace strix;
+
+namespace {
+
+constexpr Micros kBeforeWrap = 0U - 3'000'000U;  // micros() wraps 3 s later
+
+struct Bench {
+  explicit Bench(Micros start = 0) : board(start) { sensors.start(board.now()); }
+
+  FakeBoard board;
+  SensorConfig config;
+  Sensors<FakeBoard> sensors{board, config};
+
+  /// Readings taken by one sensor while the loop passes every `pass` us.
+  template <class Update>
+  std::uint32_t readings(std::uint64_t duration, Micros pass, Update&& update) {
+    std::uint32_t count = 0;
+    const std::uint64_t end = board.time() + duration;
+    while (board.time() < end) {
+      if (update(sensors, board.now())) ++count;
+      board.advance(pass);
+    }
+    return count;
+  }
+};
+
+constexpr auto kImu = [](Sensors<FakeBoard>& s, Micros now) { return s.imuUpdate(now); };
+constexpr auto kMag = [](Sensors<FakeBoard>& s, Micros now) { return s.magUpdate(now); };
+constexpr auto kAlt = [](Sensors<FakeBoard>& s, Micros now) { return s.altUpdate(now); };
+constexpr auto kGps = [](Sensors<FakeBoard>& s, Micros now) { return s.gpsUpdate(now); };
+
+void test_the_imu_is_read_1000_times_a_second() {
+  // From a device that measures every 889 us (1125 Hz), every 1000 us, beside the loop's phase or
+  // in it; with quick passes, with ones that do not divide the period, and across the wrap.
+  for (const Micros start : {Micros{0}, kBeforeWrap}) {
+    for (const Micros period : {Micros{889}, Micros{1000}, Micros{100}}) {
+      for (const Micros offset : {Micros{0}, Micros{300}, Micros{888}}) {
+        for (const Micros pass : {Micros{50}, Micros{130}, Micros{500}}) {
+          Bench bench(start);
+          bench.board.imu.period = period;
+          bench.board.imu.offset = offset;
+          // One may be under way at either end.
+          TEST_ASSERT_UINT32_WITHIN(1, 10'000, bench.readings(10'000'000, pass, kImu));
+        }
+      }
+    }
+  }
+}
+
+void test_the_slower_sensors_keep_their_rates_too() {
+  for (const Micros pass : {Micros{100}, Micros{700}, Micros{1400}}) {
+    Bench bench(kBeforeWrap);
+    TEST_ASSERT_UINT32_WITHIN(1, 1000, bench.readings(10'000'000, pass, kMag));
+    TEST_ASSERT_UINT32_WITHIN(1, 500, bench.readings(10'000'000, pass, kAlt));
+    TEST_ASSERT_UINT32_WITHIN(1, 100, bench.readings(10'000'000, pass, kGps));
+  }
+}
+
+void test_a_device_slower_than_its_task_sets_the_rate_and_nothing_is_read_twice() {
+  Bench bench;
+  bench.board.imu.period = 1125;
+  TEST_ASSERT_EQUAL_UINT32(8889, bench.readings(10'000'000, 50, kImu));
+  TEST_ASSERT_EQUAL_UINT32(8889, bench.board.imu.taken);
+}
+
+void test_a_reading_comes_through_as_it_was_measured_and_only_once() {
+  Bench bench(kBeforeWrap);
+  Micros last = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const float value = static_cast<float>(i);
+    bench.board.imu.reading.accel = {value, -value, 2.0F * value};
+    bench.board.imu.reading.temperature = value;
+    const std::uint32_t taken = bench.board.imu.taken;
+    const bool updated = bench.sensors.imuUpdate(bench.board.now());
+    TEST_ASSERT_TRUE(updated == (bench.board.imu.taken == taken + 1));
+    if (updated) {
+      const ImuRaw& raw = bench.sensors.getIMUMeas();
+      TEST_ASSERT_TRUE(raw.accel == bench.board.imu.reading.accel);
+      TEST_ASSERT_TRUE(raw.temperature == value);
+      if (bench.board.imu.taken > 1) TEST_ASSERT_TRUE(elapsed(raw.sampled, last) < 3000);
+      TEST_ASSERT_TRUE(raw.sampled != last);
+      last = raw.sampled;
+    }
+    bench.board.advance(400);
+  }
+}
+
+void test_a_sensor_is_not_asked_before_it_is_due() {
+  Bench bench;
+  bench.readings(1'000'000, 50, kMag);
+  TEST_ASSERT_EQUAL_UINT32(100, bench.board.mag.asked);
+}
+
+void test_a_silent_device_is_asked_again_in_every_pass_until_it_answers() {
+  Bench bench;
+  bench.readings(100'000, 100, kImu);
+  bench.board.imu.dead = true;
+  const std::uint32_t asked = bench.board.imu.asked;
+  TEST_ASSERT_EQUAL_UINT32(0, bench.readings(50'000, 100, kImu));
+  TEST_ASSERT_UINT32_WITHIN(10, 500, bench.board.imu.asked - asked);
+  bench.board.imu.dead = false;
+  TEST_ASSERT_TRUE(bench.sensors.imuUpdate(bench.board.now()));
+}
+
+void test_after_a_silence_there_is_no_burst_of_readings_and_one_overrun() {
+  Bench bench;
+  bench.board.imu.period = 100;  // a new reading at every pass, were it asked
+  bench.readings(100'000, 100, kImu);
+  bench.board.imu.dead = true;
+  bench.readings(50'000, 100, kImu);
+  bench.board.imu.dead = false;
+  TEST_ASSERT_EQUAL_UINT32(0, bench.sensors.overruns());
+  TEST_ASSERT_UINT32_WITHIN(1, 10, bench.readings(10'000, 100, kImu));
+  TEST_ASSERT_EQUAL_UINT32(1, bench.sensors.overruns());
+}
+
+void test_a_loop_too_slow_for_the_imu_counts_every_period_that_it_missed() {
+  Bench bench;
+  // Every 4 ms: each reading is 3 periods late.
+  TEST_ASSERT_EQUAL_UINT32(250, bench.readings(1'000'000, 4000, kImu));
+  TEST_ASSERT_EQUAL_UINT32(249, bench.sensors.overruns());
+}
+
+struct Freshness {
+  const char* name;
+  Micros timeout;
+  bool (Sensors<FakeBoard>::*fresh)(Micros) const;
+  bool (Sensors<FakeBoard>::*update)(Micros);
+};
+
+constexpr Freshness kFreshness[] = {
+    {"imu", 20'000, &Sensors<FakeBoard>::imuFresh, &Sensors<FakeBoard>::imuUpdate},
+    {"mag", 500'000, &Sensors<FakeBoard>::magFresh, &Sensors<FakeBoard>::magUpdate},
+    {"alt", 500'000, &Sensors<FakeBoard>::altFresh, &Sensors<FakeBoard>::altUpdate},
+    {"gps", 1'000'000, &Sensors<FakeBoard>::gpsFresh, &Sensors<FakeBoard>::gpsUpdate},
+};
+
+void silence(FakeBoard& board, bool dead) {
+  board.imu.dead = board.mag.dead = board.alt.dead = board.gps.dead = dead;
+}
+
+void test_a_sensor_never_heard_is_not_there() {
+  for (const Freshness& sensor : kFreshness) {
+    for (const Micros start : {Micros{0}, kBeforeWrap}) {
+      Bench bench(start);
+      silence(bench.board, true);
+      for (int i = 0; i < 5000; ++i) {
+        TEST_ASSERT_FALSE_MESSAGE((bench.sensors.*sensor.fresh)(bench.board.now()), sensor.name);
+        TEST_ASSERT_FALSE_MESSAGE((bench.sensors.*sensor.update)(bench.board.now()), sensor.name);
+        bench.board.advance(1000);
+      }
+    }
+  }
+}
+
+void test_a_sensor_is_lost_when_its_silence_exceeds_the_limit_and_found_when_it_speaks() {
+  for (const Freshness& sensor : kFreshness) {
+    Bench bench(0U - 100'000U);  // the wrap falls into the silence
+    TEST_ASSERT_TRUE((bench.sensors.*sensor.update)(bench.board.now()));
+    silence(bench.board, true);
+    bench.board.advance(sensor.timeout);
+    TEST_ASSERT_FALSE((bench.sensors.*sensor.update)(bench.board.now()));
+    TEST_ASSERT_TRUE_MESSAGE((bench.sensors.*sensor.fresh)(bench.board.now()), sensor.name);
+    bench.board.advance(1);
+    TEST_ASSERT_FALSE((bench.sensors.*sensor.update)(bench.board.now()));
+    TEST_ASSERT_FALSE_MESSAGE((bench.sensors.*sensor.fresh)(bench.board.now()), sensor.name);
+    silence(bench.board, false);
+    TEST_ASSERT_TRUE((bench.sensors.*sensor.update)(bench.board.now()));
+    TEST_ASSERT_TRUE_MESSAGE((bench.sensors.*sensor.fresh)(bench.board.now()), sensor.name);
+  }
+}
+
+void test_a_sensor_that_died_an_hour_ago_does_not_come_back_with_the_clock() {
+  // 71.6 min after its last reading the clock shows the same time again.
+  for (const Freshness& sensor : kFreshness) {
+    Bench bench;
+    TEST_ASSERT_TRUE((bench.sensors.*sensor.update)(bench.board.now()));
+    silence(bench.board, true);
+    const std::uint64_t wrap = std::uint64_t{1} << 32U;
+    while (bench.board.time() < wrap + 2 * sensor.timeout) {
+      TEST_ASSERT_FALSE((bench.sensors.*sensor.update)(bench.board.now()));
+      if (bench.board.time() > sensor.timeout) {
+        TEST_ASSERT_FALSE_MESSAGE((bench.sensors.*sensor.fresh)(bench.board.now()), sensor.name);
+      }
+      // Slowly through the hour, closely around the wrap.
+      const bool near = bench.board.time() + 1'000'000 > wrap;
+      bench.board.advance(near ? 1000 : 100'000);
+    }
+  }
+}
+
+}  // namespace
+
+void runRateTests() {
+  Unity.TestFile = __FILE__;
+  RUN_TEST(test_the_imu_is_read_1000_times_a_second);
+  RUN_TEST(test_the_slower_sensors_keep_their_rates_too);
+  RUN_TEST(test_a_device_slower_than_its_task_sets_the_rate_and_nothing_is_read_twice);
+  RUN_TEST(test_a_reading_comes_through_as_it_was_measured_and_only_once);
+  RUN_TEST(test_a_sensor_is_not_asked_before_it_is_due);
+  RUN_TEST(test_a_silent_device_is_asked_again_in_every_pass_until_it_answers);
+  RUN_TEST(test_after_a_silence_there_is_no_burst_of_readings_and_one_overrun);
+  RUN_TEST(test_a_loop_too_slow_for_the_imu_counts_every_period_that_it_missed);
+  RUN_TEST(test_a_sensor_never_heard_is_not_there);
+  RUN_TEST(test_a_sensor_is_lost_when_its_silence_exceeds_the_limit_and_found_when_it_speaks);
+  RUN_TEST(test_a_sensor_that_died_an_hour_ago_does_not_come_back_with_the_clock);
+}

@@ -1,0 +1,1 @@
+"""Strix: simulator, replay, report, calibration and gains of the quadcopter."""

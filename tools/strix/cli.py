@@ -1,0 +1,121 @@
+"""The command `strix`: one thin function a verb, over a library call."""
+
+from __future__ import annotations
+
+import functools
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, ParamSpec
+
+import typer
+
+from strix.errors import BadInput
+
+app = typer.Typer(
+    name="strix",
+    help="Fly, replay and measure the Strix flight software on a laptop.",
+    no_args_is_help=True,
+    add_completion=True,
+    pretty_exceptions_enable=False,
+)
+
+P = ParamSpec("P")
+
+
+def says_what_is_wrong(command: Callable[P, None]) -> Callable[P, None]:
+    """Bad input ends in one line on stderr and status 2, never in a traceback."""
+
+    @functools.wraps(command)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        try:
+            command(*args, **kwargs)
+        except BadInput as error:
+            print(f"strix: {error}", file=sys.stderr)
+            raise typer.Exit(2) from None
+
+    return run
+
+
+@app.callback()
+def main() -> None:
+    """Fly, replay and measure the Strix flight software on a laptop."""
+
+
+@app.command(epilog="Example: strix fly --heading 90 --seed 7 --out out")
+@says_what_is_wrong
+def fly(
+    vehicle: Annotated[str, typer.Option(help="Airframe, of include/vehicles/")] = "Quad5in",
+    mission: Annotated[
+        str, typer.Option(help="Mission of include/missions/, or a mission file")
+    ] = "first-flight",
+    scenario: Annotated[str, typer.Option(help="What surrounds the flight: calm, wind, …")] = "calm",
+    heading: Annotated[float, typer.Option(help="Start heading, deg clockwise from north")] = 0.0,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Of all noise and gusts")] = 1,
+    out: Annotated[
+        Path, typer.Option(help="Folder for flight.ulg, report.html and summary.json")
+    ] = Path("out"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON")] = False,
+) -> None:
+    """Fly a mission in simulation: the flight software itself against a simulated aircraft.
+
+    Exits with 0 when the aircraft landed and disarmed, with 1 when it did not.
+    """
+    from strix.fly import fly_and_report, make_plan
+    from strix.summary import print_summary
+
+    plan = make_plan(vehicle, mission, scenario, heading, seed)
+    summary = fly_and_report(plan, out)
+    if as_json:
+        print(json.dumps(summary.to_dict()))
+    else:
+        print_summary(summary)
+        print(f"{out}/flight.ulg, {out}/report.html, {out}/summary.json")
+    if not (summary.landed and summary.disarmed):
+        raise typer.Exit(1)
+
+
+@app.command(epilog="Example: strix estimate recording/ --declination 11.7 --delay gps=0.22")
+@says_what_is_wrong
+def estimate(
+    recording: Annotated[Path, typer.Argument(help="Folder with imu.csv[.gz] and others")],
+    out: Annotated[Path, typer.Option(help="The estimate, a CSV file")] = Path("est.csv"),
+    declination: Annotated[
+        float, typer.Option(help="Of the magnetic field, deg, east positive")
+    ] = 0.0,
+    delay: Annotated[
+        str, typer.Option(help="Age of readings, s: gps=0.22,baro=0.35,mag=0.03")
+    ] = "",
+) -> None:
+    """Run the flight filter on a recording of real sensors."""
+    import math
+
+    from strix import estimate as library
+    from strix.recording import read_recording
+
+    delays_s = library.parse_delays(delay)
+    result = library.estimate(read_recording(recording), math.radians(declination), delays_s)
+    library.write_estimate(out, result)
+    print(f"{len(result.table)} rows written to {out}")
+
+
+@app.command(epilog="Example: strix score est.csv recording/ref_att.csv.gz --after 30")
+@says_what_is_wrong
+def score(
+    estimate: Annotated[Path, typer.Argument(help="From strix estimate")],
+    reference: Annotated[Path, typer.Argument(help="ref_att.csv[.gz] of the recording")],
+    after: Annotated[float, typer.Option(help="Leave out what came before, s")] = 0.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the scores as JSON")] = False,
+) -> None:
+    """Compare an estimated attitude with a reference: RMS errors in degrees."""
+    from strix import score as library
+
+    result = library.score(
+        library.read_attitude(estimate), library.read_reference(reference), after
+    )
+    print(json.dumps(result.to_dict()) if as_json else result.table())
+
+
+if __name__ == "__main__":
+    app()

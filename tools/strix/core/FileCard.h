@@ -1,0 +1,43 @@
+/// The log's block device on a laptop: an ordinary file.
+#pragma once
+
+#include <BlockDevice.h>
+
+#include <cstdio>
+#include <memory>
+#include <string>
+
+namespace strix {
+
+/// Never busy. The file ends where the last sync said it does, as the card's would.
+class FileCard {
+ public:
+  explicit FileCard(const std::string& path) : path_(path), file_(std::fopen(path.c_str(), "wb+")) {}
+
+  FileCard(const FileCard&) = delete;
+  FileCard& operator=(const FileCard&) = delete;
+
+  /// False when the file could not be made; errno says why.
+  [[nodiscard]] bool open() const { return file_ != nullptr; }
+
+  [[nodiscard]] bool busy() const { return false; }
+
+  [[nodiscard]] bool writeSector(std::uint32_t index, const std::uint8_t (&data)[kSectorSize]) {
+    if (file_ == nullptr) return false;
+    const long offset = static_cast<long>(index) * static_cast<long>(kSectorSize);
+    return std::fseek(file_.get(), offset, SEEK_SET) == 0 &&
+           std::fwrite(data, 1, kSectorSize, file_.get()) == kSectorSize;
+  }
+
+  [[nodiscard]] bool sync(std::uint32_t length);
+
+ private:
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+
+  std::string path_;
+  std::unique_ptr<std::FILE, Close> file_;
+};
+
+}  // namespace strix

@@ -1,0 +1,61 @@
+/// A Board fed from outside: the simulator puts readings and switches in and takes commands out.
+#pragma once
+
+#include <Board.h>
+
+#include <optional>
+#include <string>
+
+#include "FileCard.h"
+
+namespace strix {
+
+class SimulatedBoard {
+ public:
+  using Card = FileCard;
+  static constexpr const char* kName = "simulator";
+
+  SimulatedBoard(const std::string& logPath, std::uint32_t bootId) : card_(logPath), bootId_(bootId) {}
+
+  // What a Board offers (Board.h).
+  [[nodiscard]] std::uint32_t bootId() const { return bootId_; }
+  [[nodiscard]] Micros micros() const { return now_; }
+  [[nodiscard]] SensorSet begin() { return {true, true, true, true, card_.open()}; }
+  [[nodiscard]] bool readImu(ImuRaw& out) { return take(imu_, out); }
+  [[nodiscard]] bool readMag(MagRaw& out) { return take(mag_, out); }
+  [[nodiscard]] bool readAlt(AltRaw& out) { return take(alt_, out); }
+  [[nodiscard]] bool readGps(GpsRaw& out) { return take(gps_, out); }
+  [[nodiscard]] PilotSwitches readPilot() const { return pilot_; }
+  void writeEsc(const EscCommands& commands) { esc_ = commands; }
+  [[nodiscard]] Card& card() { return card_; }
+
+  // The outside. A reading stays until it is read or a newer one takes its place.
+  void setTime(Micros now) { now_ = now; }
+  void setPilot(const PilotSwitches& pilot) { pilot_ = pilot; }
+  void put(const ImuRaw& reading) { imu_ = reading; }
+  void put(const MagRaw& reading) { mag_ = reading; }
+  void put(const AltRaw& reading) { alt_ = reading; }
+  void put(const GpsRaw& reading) { gps_ = reading; }
+  [[nodiscard]] const EscCommands& esc() const { return esc_; }
+
+ private:
+  template <class Reading>
+  [[nodiscard]] static bool take(std::optional<Reading>& slot, Reading& out) {
+    if (!slot) return false;
+    out = *slot;
+    slot.reset();
+    return true;
+  }
+
+  FileCard card_;
+  std::uint32_t bootId_;
+  Micros now_ = 0;
+  PilotSwitches pilot_;
+  std::optional<ImuRaw> imu_;
+  std::optional<MagRaw> mag_;
+  std::optional<AltRaw> alt_;
+  std::optional<GpsRaw> gps_;
+  EscCommands esc_{};
+};
+
+}  // namespace strix

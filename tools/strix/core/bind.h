@@ -1,0 +1,8 @@
+/// The parts of the module strix._core, one a file.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+void bindEstimator(nanobind::module_& m);
+void bindFlight(nanobind::module_& m);
+void bindVehicles(nanobind::module_& m);

@@ -1,0 +1,9 @@
+/// strix._core: the flight code, bound to Python.
+#include "bind.h"
+
+NB_MODULE(_core, m) {
+  m.doc() = "The Strix flight code, compiled for this machine";
+  bindEstimator(m);
+  bindFlight(m);
+  bindVehicles(m);
+}

@@ -1,0 +1,132 @@
+"""One simulated flight: the flight software on one side, the plant on the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from strix import _core
+from strix.missions import Mission
+from strix.plant.earth import MAGNETIC_DECLINATION_RAD
+from strix.plant.plant import Plant
+from strix.plant.scenario import Scenario
+from strix.plant.sensors import DEFAULT_CONSTANTS, Samples, SensorConstants, SensorSuite
+from strix.track import TruthRecorder, TruthTrack
+from strix.vehicles import plant_numbers
+
+STEP_US = 1000  # one pass of the flight software's loop
+TRUTH_EVERY = 10  # steps: the truth is kept at 100 Hz
+ARM_AT_S = 20.0  # the aircraft stands still until then
+START_AFTER_S = 2.0  # from arming to take-off
+RETRY_S = 2.0  # arming was refused: switch off, and on again after this long
+AFTER_LANDING_S = 2.0
+GIVE_UP_S = 180.0
+
+Progress = Callable[[float, str], None]  # time s, state name
+
+
+@dataclass(frozen=True)
+class FlightPlan:
+    """What is flown, in what, from which heading."""
+
+    vehicle: str
+    mission: Mission
+    scenario: Scenario
+    heading_deg: float
+    seed: int
+    sensors: SensorConstants = DEFAULT_CONSTANTS
+
+
+class Pilot:
+    """Moves the switches: arms after the standstill, starts the mission, lets go after landing."""
+
+    def __init__(self) -> None:
+        self._arm_since_s: float | None = None
+        self._retry_at_s = ARM_AT_S
+        self._flew = False
+        self.done_at_s: float | None = None
+
+    def switches(self, time_s: float, state: str, motors_on: bool) -> tuple[bool, bool]:
+        """Arm and start switch at this time."""
+        if self._arm_since_s is None:
+            if not self._flew and time_s >= self._retry_at_s:
+                self._arm_since_s = time_s
+            return self._arm_since_s is not None, False
+        waited_s = time_s - self._arm_since_s
+        if state in ("TAKEOFF", "HOLD", "WAYPOINT", "LAND"):
+            self._flew = True
+        if not motors_on and (self._flew or waited_s > 0.5):  # landed or cut off, or refused
+            self._arm_since_s = None
+            self._retry_at_s = time_s + RETRY_S
+            if self._flew:
+                self.done_at_s = time_s + AFTER_LANDING_S
+            return False, False
+        return True, waited_s >= START_AFTER_S
+
+
+def fly(
+    plan: FlightPlan, log_path: Path, progress: Progress, give_up_s: float = GIVE_UP_S
+) -> TruthTrack:
+    """Flies until the aircraft has landed, or gives up; the log is what the card would hold."""
+    mission = plan.mission
+    plant = Plant(
+        plant_numbers(plan.vehicle), plan.scenario, math.radians(plan.heading_deg), plan.seed
+    )
+    sensors = SensorSuite(plan.scenario, plan.seed, plan.sensors)
+    flight = _core.Flight(
+        vehicle=plan.vehicle,
+        mission=mission.name,
+        takeoff_height_m=mission.takeoff_height_m,
+        takeoff_hold_s=mission.takeoff_hold_s,
+        legs=list(mission.legs),
+        declination_rad=MAGNETIC_DECLINATION_RAD,
+        log_path=str(log_path),
+        boot_id=plan.seed,
+        start_time_us=plant.truth.time_us,
+    )
+    pilot = Pilot()
+    recorder = TruthRecorder()
+    commands = flight.loop(plant.truth.time_us)
+    step = 0
+    while True:
+        plant.step(commands, STEP_US)
+        truth = plant.truth
+        now_us = truth.time_us
+        _deliver(flight, sensors.sample(truth))
+        commands = flight.loop(now_us)
+        step += 1
+        if step % TRUTH_EVERY == 0:
+            recorder.add(truth)
+            time_s = now_us * 1e-6
+            state = flight.state_name
+            arm, start = pilot.switches(time_s, state, flight.motors_on)
+            flight.set_switches(arm=arm, start=start, kill=False)
+            progress(time_s, state)
+            if time_s > give_up_s or (pilot.done_at_s is not None and time_s >= pilot.done_at_s):
+                break
+    flight.close()
+    return recorder.track()
+
+
+def _deliver(flight: _core.Flight, samples: Samples) -> None:
+    """Hands the flight software what became ready since the last step."""
+    if (imu := samples.imu) is not None:
+        flight.put_imu(imu.sampled_us, imu.accel_m_s2, imu.gyro_rad_s, 25.0)
+    if (mag := samples.mag) is not None:
+        flight.put_mag(mag.sampled_us, mag.field_ut)
+    if (baro := samples.baro) is not None:
+        flight.put_alt(baro.sampled_us, baro.pressure_pa, baro.temperature_degc)
+    if (gps := samples.gps) is not None:
+        flight.put_gps(
+            gps.sampled_us,
+            gps.latitude_1e7deg,
+            gps.longitude_1e7deg,
+            gps.altitude_mm,
+            gps.speed_knots,
+            gps.course_deg,
+            gps.hdop,
+            gps.fix,
+            gps.satellites,
+        )
