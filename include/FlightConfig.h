@@ -15,11 +15,18 @@ constexpr float kDeclination = 4.0F * kDegToRad;
 /// it does not know.
 constexpr Micros kGpsDelay = 100'000;
 
+/// How the LIS2MDL sits in the body: its x and z axes as the body's, its y axis to the left. As its
+/// axes are left-handed this is a reflection, whatever the mounting; another mounting moves the sign.
+[[nodiscard]] inline Matrix3f magSensorToBody() {
+  return Vector3f{1.0F, -1.0F, 1.0F}.asDiagonal();
+}
+
 /// Configuration of one airframe with the defaults of every library.
 [[nodiscard]] inline FlightSoftwareConfig flightConfig(const Vehicle& vehicle, const Gains& gains,
                                                        const Mission& mission, float declination) {
   FlightSoftwareConfig config{vehicle, gains, mission};
   config.declination = declination;
+  config.sensors.mag.sensorToBody = magSensorToBody();
   config.navigation.gpsDelay = kGpsDelay;
   return config;
 }

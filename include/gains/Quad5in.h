@@ -5,30 +5,32 @@
 
 namespace strix {
 
+// clang-format off
 constexpr Gains kQuad5inGains{
     "Quad5in LQR 500 Hz",
     {{
         // thrust, N
-        {0.0F, 0.0F, -1.993491F,  // position
-         0.0F, 0.0F, -2.698741F,  // velocity
+        {0.0F, 0.0F, -1.99349F,  // position
+         0.0F, 0.0F, -2.69874F,  // velocity
          0.0F, 0.0F, 0.0F,  // alpha
          0.0F, 0.0F, 0.0F},  // body rate
         // tau_x, N m
-        {0.0F, 0.009882071F, 0.0F,  // position
-         0.0F, 0.01646439F, 0.0F,  // velocity
+        {0.0F, 0.00988207F, 0.0F,  // position
+         0.0F, 0.0164644F, 0.0F,  // velocity
          0.105832F, 0.0F, 0.0F,  // alpha
-         0.03527567F, 0.0F, 0.0F},  // body rate
+         0.0352757F, 0.0F, 0.0F},  // body rate
         // tau_y, N m
-        {-0.009902898F, 0.0F, 0.0F,  // position
-         -0.01682156F, 0.0F, 0.0F,  // velocity
-         0.0F, 0.1113753F, 0.0F,  // alpha
-         0.0F, 0.03876349F, 0.0F},  // body rate
+        {-0.0099029F, 0.0F, 0.0F,  // position
+         -0.0168216F, 0.0F, 0.0F,  // velocity
+         0.0F, 0.111375F, 0.0F,  // alpha
+         0.0F, 0.0387635F, 0.0F},  // body rate
         // tau_z, N m
         {0.0F, 0.0F, 0.0F,  // position
          0.0F, 0.0F, 0.0F,  // velocity
-         0.0F, 0.0F, 0.06610685F,  // alpha
-         0.0F, 0.0F, 0.04187597F},  // body rate
+         0.0F, 0.0F, 0.0661068F,  // alpha
+         0.0F, 0.0F, 0.041876F},  // body rate
     }},
 };
+// clang-format on
 
 }  // namespace strix

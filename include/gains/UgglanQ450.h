@@ -5,30 +5,32 @@
 
 namespace strix {
 
+// clang-format off
 constexpr Gains kUgglanQ450Gains{
     "UgglanQ450 LQR 500 Hz",
     {{
         // thrust, N
-        {0.0F, 0.0F, -1.994584F,  // position
-         0.0F, 0.0F, -2.863373F,  // velocity
+        {0.0F, 0.0F, -1.99458F,  // position
+         0.0F, 0.0F, -2.86337F,  // velocity
          0.0F, 0.0F, 0.0F,  // alpha
          0.0F, 0.0F, 0.0F},  // body rate
         // tau_x, N m
-        {0.0F, 0.003977405F, 0.0F,  // position
-         0.0F, 0.01216096F, 0.0F,  // velocity
-         0.1347031F, 0.0F, 0.0F,  // alpha
-         0.07899488F, 0.0F, 0.0F},  // body rate
+        {0.0F, 0.0039774F, 0.0F,  // position
+         0.0F, 0.012161F, 0.0F,  // velocity
+         0.134703F, 0.0F, 0.0F,  // alpha
+         0.0789949F, 0.0F, 0.0F},  // body rate
         // tau_y, N m
-        {-0.003977405F, 0.0F, 0.0F,  // position
-         -0.01216096F, 0.0F, 0.0F,  // velocity
-         0.0F, 0.1347031F, 0.0F,  // alpha
-         0.0F, 0.07899488F, 0.0F},  // body rate
+        {-0.0039774F, 0.0F, 0.0F,  // position
+         -0.012161F, 0.0F, 0.0F,  // velocity
+         0.0F, 0.134703F, 0.0F,  // alpha
+         0.0F, 0.0789949F, 0.0F},  // body rate
         // tau_z, N m
         {0.0F, 0.0F, 0.0F,  // position
          0.0F, 0.0F, 0.0F,  // velocity
-         0.0F, 0.0F, 0.1656706F,  // alpha
-         0.0F, 0.0F, 0.1550924F},  // body rate
+         0.0F, 0.0F, 0.165671F,  // alpha
+         0.0F, 0.0F, 0.155092F},  // body rate
     }},
 };
+// clang-format on
 
 }  // namespace strix

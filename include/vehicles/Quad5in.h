@@ -12,23 +12,23 @@ constexpr Vehicle kQuad5in{
     {0.003F, 0.004F, 0.005F},  // kg m^2
     // 0.08 m to the roll and to the pitch axis. tau_z (- + - +): a clockwise rotor turns the body
     // to the left, -z, so M1 and M3 turn clockwise.
-    {{{0.08F, -0.08F, Spin::Clockwise},             // M1 front left
-      {0.08F, 0.08F, Spin::CounterClockwise},       // M2 front right
-      {-0.08F, 0.08F, Spin::Clockwise},             // M3 rear right
-      {-0.08F, -0.08F, Spin::CounterClockwise}}},   // M4 rear left
+    {{{0.08F, -0.08F, Spin::Clockwise},            // M1 front left
+      {0.08F, 0.08F, Spin::CounterClockwise},      // M2 front right
+      {-0.08F, 0.08F, Spin::Clockwise},            // M3 rear right
+      {-0.08F, -0.08F, Spin::CounterClockwise}}},  // M4 rear left
     "rev/s",
-    6.583e-5F,                               // N/(rev/s)^2
-    7.51e-7F,                                // N m/(rev/s)^2
-    0.04F,                                   // s, DESIGN.md's stand-in for an unpublished value
-    {1195.0F, 0.0F, 755.0F / 160000.0F},     // us = 1195 + n^2 / 160000 x 755
+    6.583e-5F,                            // N/(rev/s)^2
+    7.51e-7F,                             // N m/(rev/s)^2
+    0.04F,                                // s, DESIGN.md's stand-in for an unpublished value
+    {1195.0F, 0.0F, 755.0F / 160000.0F},  // us = 1195 + n^2 / 160000 x 755
     "us",
-    1150.0F,                                 // off
-    1950.0F,                                 // most the ESC accepts
-    1700.0F,                                 // flight cap: 69 % of 1150..1950, 327 rev/s, 3.5 weights
-    60.0F,  // ours: 12 % of the weight; an ESC without sensors keeps sync well below, at 3600 rev/min
+    1150.0F,  // off
+    1950.0F,  // most the ESC accepts
+    1700.0F,  // flight cap: 69 % of 1150..1950, 327 rev/s, 3.5 weights
+    60.0F,    // ours: 3600 rev/min, 12 % of the weight; slow enough to sink, too fast to lose sync
     // ours: the ratios are what counts, tuned with `strix gains` for a position step that settles
-    // within 10 s without overshoot and for 45 deg and 6 dB with the motor lag, which the design does
-    // not know: a small acceptable torque keeps the rate loop slow (11 rad/s) against 1 / 0.04 s.
+    // within 10 s without overshoot and for 45 deg and 6 dB with the motor lag, which the design
+    // does not know: a small acceptable torque keeps the rate loop, 11 rad/s, below the motors' 25.
     {
         1.0F,   // m, position, horizontal
         1.0F,   // m, position, vertical

@@ -12,20 +12,20 @@ constexpr Vehicle kUgglanQ450{
     {0.014F, 0.014F, 0.026F},  // kg m^2
     // X layout, 0.23 m from motor to centre: 0.163 m to the roll and to the pitch axis. tau_z
     // (- + - +): a clockwise rotor turns the body to the left, -z, so M1 and M3 turn clockwise.
-    {{{0.163F, 0.163F, Spin::Clockwise},             // M1 front right
-      {-0.163F, 0.163F, Spin::CounterClockwise},     // M2 rear right
-      {-0.163F, -0.163F, Spin::Clockwise},           // M3 rear left
-      {0.163F, -0.163F, Spin::CounterClockwise}}},   // M4 front left
+    {{{0.163F, 0.163F, Spin::Clockwise},            // M1 front right
+      {-0.163F, 0.163F, Spin::CounterClockwise},    // M2 rear right
+      {-0.163F, -0.163F, Spin::Clockwise},          // M3 rear left
+      {0.163F, -0.163F, Spin::CounterClockwise}}},  // M4 front left
     "rad/s",
-    8.37e-6F,                  // N/(rad/s)^2
-    8.37e-6F / 50.0F,          // N m/(rad/s)^2
-    0.08F,                     // s
-    {-9675.0F, 57.0F, 0.0F},   // int16 = 57 w - 9675
+    8.37e-6F,                 // N/(rad/s)^2
+    8.37e-6F / 50.0F,         // N m/(rad/s)^2
+    0.08F,                    // s
+    {-9675.0F, 57.0F, 0.0F},  // int16 = 57 w - 9675
     "int16",
-    0.0F,                      // off: the ESC takes everything below 200 rad/s for this; no reverse
-    32767.0F,                  // int16
-    31000.0F,                  // ours: 714 rad/s, 1.6 weights; the rest is kept for a sagging battery
-    220.0F,                    // ours: 10 % above the 200 rad/s at which the motor stops
+    0.0F,      // off: the ESC takes everything below 200 rad/s for this; no reverse
+    32767.0F,  // int16
+    31000.0F,  // ours: 714 rad/s, 1.6 weights; the rest is kept for a sagging battery
+    220.0F,    // ours: 10 % above the 200 rad/s at which the motor stops
     // ours: as for Quad5in, and slower, because the motors lag twice as long.
     {
         2.5F,   // m, position, horizontal

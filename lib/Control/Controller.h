@@ -76,23 +76,20 @@ class Controller {
     // Thrust points along -z body: forward needs the nose down, to the right the right side down.
     const Vector3f a = limited(toHeading(reference.accelerationNed, yawReference),
                                limits_.acceleration, limits_.acceleration);
-    attitudeReference_ =
-        eulerToQuaternion({arcTangent(a.y() / kGravity), -arcTangent(a.x() / kGravity), yawReference});
+    attitudeReference_ = eulerToQuaternion(
+        {arcTangent(a.y() / kGravity), -arcTangent(a.x() / kGravity), yawReference});
     nominalThrust_ = mass_ * (kGravity - a.z());
   }
 
   /// Errors of `state` from the reference last taken.
   void updateError(const VehicleState& state) {
     // K is designed at yaw 0: the horizontal errors are turned into the aircraft's own heading.
-    const Vector3f position =
-        limited(toHeading(state.positionNed - reference_.positionNed, yaw_), limits_.positionHorizontal,
-                limits_.positionVertical);
-    const Vector3f velocity =
-        limited(toHeading(state.velocityNed - reference_.velocityNed, yaw_), limits_.velocityHorizontal,
-                limits_.velocityVertical);
+    const Vector3f position = limited(toHeading(state.positionNed - reference_.positionNed, yaw_),
+                                      limits_.positionHorizontal, limits_.positionVertical);
+    const Vector3f velocity = limited(toHeading(state.velocityNed - reference_.velocityNed, yaw_),
+                                      limits_.velocityHorizontal, limits_.velocityVertical);
     // The reference turns about down, not about the body's z axis.
-    const Vector3f rateReference =
-        rotateToBody(state.attitude, {0.0F, 0.0F, reference_.yawRate});
+    const Vector3f rateReference = rotateToBody(state.attitude, {0.0F, 0.0F, reference_.yawRate});
     error_ << position, velocity, attitudeError(attitudeReference_, state.attitude),
         state.rateBody - rateReference;
   }
@@ -132,7 +129,8 @@ class Controller {
 
   [[nodiscard]] static bool finite(const Reference& r, const VehicleState& s) {
     const Eigen::Matrix<float, 6, 1> scalars =
-        (Eigen::Matrix<float, 6, 1>() << s.attitude.w, s.attitude.vec(), r.yaw, r.yawRate).finished();
+        (Eigen::Matrix<float, 6, 1>() << s.attitude.w, s.attitude.vec(), r.yaw, r.yawRate)
+            .finished();
     return isFinite(scalars) && isFinite(s.positionNed) && isFinite(s.velocityNed) &&
            isFinite(s.rateBody) && isFinite(r.positionNed) && isFinite(r.velocityNed) &&
            isFinite(r.accelerationNed);

@@ -11,8 +11,8 @@ constexpr std::size_t kErrorCount = 12;   ///< position, velocity, alpha, body r
 
 struct Gains {
   const char* design;  ///< vehicle and method, for the log
-  /// u = u_nom - k e. Rows in N, N m; columns in m, m/s, rad, rad/s; position and velocity errors in
-  /// the heading frame (forward, right, down).
+  /// u = u_nom - k e. Rows in N, N m; columns in m, m/s, rad, rad/s; position and velocity errors
+  /// in the heading frame (forward, right, down).
   std::array<std::array<float, kErrorCount>, kControlCount> k;
 };
 

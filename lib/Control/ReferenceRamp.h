@@ -1,4 +1,4 @@
-/// Guidance: brings position and yaw from where they are to a target, smoothly and in a straight line.
+/// Guidance: brings position and yaw to a target, smoothly and in a straight line.
 #pragma once
 
 #include "Mathpk.h"
@@ -6,11 +6,11 @@
 namespace strix {
 
 struct RampLimits {
-  float speedHorizontal = 1.0F;             ///< m/s
-  float speedVertical = 0.7F;               ///< m/s
-  float acceleration = 1.0F;                ///< m/s^2, along the path
-  float yawRate = 45.0F * kDegToRad;        ///< rad/s
-  float yawAcceleration = 90.0F * kDegToRad;///< rad/s^2
+  float speedHorizontal = 1.0F;               ///< m/s
+  float speedVertical = 0.7F;                 ///< m/s
+  float acceleration = 1.0F;                  ///< m/s^2, along the path
+  float yawRate = 45.0F * kDegToRad;          ///< rad/s
+  float yawAcceleration = 90.0F * kDegToRad;  ///< rad/s^2
 };
 
 /// Distance still to go at a bounded speed and acceleration, from rest to rest.

@@ -8,7 +8,7 @@
 ///   std::uint32_t bootId();             differs between two starts, as far as the board can tell
 ///   Micros micros();                    the clock; read once a pass
 ///   SensorSet begin();                  starts buses and devices; returns those that answered.
-///                                       Called once by setup(); may take up to 2 s.
+///                                       Called once by setup(), on the ground; may take seconds.
 ///   bool readImu(ImuRaw&);              true and filled when a reading newer than the last one is
 ///   bool readMag(MagRaw&);              there. Never waits for one; the time each may take at worst
 ///   bool readAlt(AltRaw&);              is the board's stated bound.

@@ -32,7 +32,7 @@ class Persistence {
 
 /// On the ground while landing: the aircraft does not sink although little thrust is left.
 struct TouchDownConfig {
-  float thrustFraction = 0.6F;   ///< of the weight
+  float thrustFraction = 0.75F;  ///< of the weight
   float sinkRate = 0.15F;        ///< m/s
   Micros duration = 400'000;
 };

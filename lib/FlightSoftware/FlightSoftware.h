@@ -45,6 +45,8 @@ class FlightSoftware {
     motors_.writeESC(board_);
     standstill_.reset(now);
     touchDown_.reset(now);
+    entered_ = now;
+    for (PeriodicTask* task : {&standstillUpdate_, &stateLog_, &switchLog_, &stdLog_}) task->start(now);
     logger_.begin(time, {config_.vehicle.name, Board::kName, kVersion, kGitCommit, board_.bootId()});
   }
 
@@ -99,6 +101,7 @@ class FlightSoftware {
       logger_.logGPS(toRecord(time, clock_.at(raw.sampled), raw));
       logAid<AidSource::Gps>(time, eskf_.gpsInnovation());
     }
+    if (onGround() && standstillUpdate_.run(now)) eskf_.updateStandstill();
     eskf_.injectError();
     if (calibrating() && startCalibration_.done()) finishCalibration(time);
 
@@ -132,6 +135,11 @@ class FlightSoftware {
 
  private:
   [[nodiscard]] bool calibrating() const { return fsm_.state() == FlightState::Boot; }
+
+  /// Known to stand still: the motors are off and nothing moves.
+  [[nodiscard]] bool onGround() const {
+    return !calibrating() && !motors_.armed() && standstill_.held();
+  }
 
   /// Aligns the filter with what the still aircraft showed.
   void finishCalibration(LogTime time) {
@@ -285,6 +293,7 @@ class FlightSoftware {
   SensorSet found_;
   Persistence touchDown_;
   Persistence standstill_;
+  PeriodicTask standstillUpdate_{periodFromHz(10)};
   PeriodicTask stateLog_{periodFromHz(10)};
   PeriodicTask switchLog_{periodFromHz(1)};
   PeriodicTask stdLog_{periodFromHz(50)};

@@ -27,6 +27,7 @@ using std::uint8_t;
 // clang-format off
 #define TOPIC(Type, name) struct Type {
 #define FIELD(type, name) type name = {};
+// NOLINTNEXTLINE(bugprone-macro-parentheses): a type in parentheses is no type
 #define ARRAY(type, length, name) std::array<type, length> name = {};
 #define END_TOPIC };
 #include "Topics.def"

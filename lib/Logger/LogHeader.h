@@ -20,13 +20,31 @@ struct LogIdentity {
   std::uint32_t bootId = 0;   ///< differs between two logs that may share a card
 };
 
+/// What the header says of a stream; its ULog msg_id is its place.
+struct TopicRow {
+  std::string_view name;
+  std::string_view format;
+  std::uint8_t instance;
+};
+
+template <class... Streams>
+[[nodiscard]] constexpr auto topicRows(const std::tuple<Streams...>* /*types*/) {
+  return std::array<TopicRow, sizeof...(Streams) + 1>{
+      {{kTopicName<typename Streams::Topic>, TopicFormat<typename Streams::Topic>::kText,
+        Streams::kInstance}...,
+       {kTopicName<topic::LogBlock>, TopicFormat<topic::LogBlock>::kText, 0}}};
+}
+
+/// The table's streams, then log_block.
+constexpr auto kTopicRows = topicRows(static_cast<const LogStreams*>(nullptr));
+static_assert(kTopicRows.size() == kLogBlockId + std::size_t{1});
+
 /// The header as kItems messages, made one at a time as the stream has room: no buffer holds it and
-/// nothing waits for it. log_block stands after the table's topics.
+/// nothing waits for it.
 class LogHeader {
  public:
   static constexpr std::size_t kInfos = 5;
-  static constexpr std::size_t kTopics = kLogStreamCount + 1;
-  static constexpr std::size_t kItems = 1 + kInfos + 2 * kTopics;
+  static constexpr std::size_t kItems = 1 + kInfos + 2 * kTopicRows.size();
 
   /// The file's first bytes: magic and the log's start, us.
   using FileStart = std::array<std::uint8_t, 16>;
@@ -44,15 +62,24 @@ class LogHeader {
     item -= 1;
     if (item < kInfos) return info(item, identity, append);
     item -= kInfos;
-    const bool subscribing = item >= kTopics;  // all formats stand before the first subscription
-    topic(subscribing ? item - kTopics : item, subscribing, append);
+    if (item < kTopicRows.size()) {  // all formats stand before the first subscription
+      const TopicRow& row = kTopicRows[item];
+      if (row.instance == 0) append(ulog::format(row.format));  // instances share it
+      return;
+    }
+    item -= kTopicRows.size();
+    const TopicRow& row = kTopicRows[item];
+    append(ulog::subscription(static_cast<std::uint16_t>(item), row.instance, row.name));
   }
 
   /// Bytes of the longest header.
   [[nodiscard]] static constexpr std::size_t maxSize() {
-    return sizeof(FileStart) + kInfos * ulog::kMaxInfo + ulog::kMessageHeader + 40 +
-           topicsSize(std::make_index_sequence<kLogStreamCount>{}) +
-           topicSize<topic::LogBlock, 0>();
+    std::size_t size = sizeof(FileStart) + ulog::kMessageHeader + 40 + kInfos * ulog::kMaxInfo;
+    for (const TopicRow& row : kTopicRows) {
+      if (row.instance == 0) size += ulog::kMessageHeader + row.format.size();
+      size += ulog::kMessageHeader + 3 + row.name.size();
+    }
+    return size;
   }
 
  private:
@@ -66,46 +93,6 @@ class LogHeader {
         {"ver_sw_git", identity.git},
     }};
     if (!infos[which].second.empty()) append(ulog::info(infos[which].first, infos[which].second));
-  }
-
-  template <class Append>
-  static void topic(std::size_t row, bool subscribing, Append& append) {
-    if (row == kLogBlockId) return message<topic::LogBlock, 0>(row, subscribing, append);
-    topicOfRow(row, subscribing, append, std::make_index_sequence<kLogStreamCount>{});
-  }
-
-  template <class Append, std::size_t... Row>
-  static void topicOfRow(std::size_t row, bool subscribing, Append& append,
-                         std::index_sequence<Row...> /*rows*/) {
-    ((row == Row ? message<RowTopic<Row>, Stream<Row>::kInstance>(row, subscribing, append)
-                 : void()),
-     ...);
-  }
-
-  template <class Topic, std::uint8_t Instance, class Append>
-  static void message(std::size_t row, bool subscribing, Append& append) {
-    if (subscribing) {
-      append(ulog::subscription(static_cast<std::uint16_t>(row), Instance, kTopicName<Topic>));
-    } else if (Instance == 0) {  // the instances of a topic share its format
-      append(ulog::format(TopicFormat<Topic>::kText));
-    }
-  }
-
-  template <class Topic, std::uint8_t Instance>
-  [[nodiscard]] static constexpr std::size_t topicSize() {
-    const std::size_t subscription = ulog::kMessageHeader + 3 + kTopicName<Topic>.size();
-    if (Instance != 0) return subscription;
-    return subscription + ulog::kMessageHeader + TopicFormat<Topic>::kText.size();
-  }
-
-  template <std::size_t Row>
-  using Stream = std::tuple_element_t<Row, LogStreams>;
-  template <std::size_t Row>
-  using RowTopic = typename Stream<Row>::Topic;
-
-  template <std::size_t... Row>
-  [[nodiscard]] static constexpr std::size_t topicsSize(std::index_sequence<Row...> /*rows*/) {
-    return (topicSize<RowTopic<Row>, Stream<Row>::kInstance>() + ...);
   }
 };
 

@@ -1,7 +1,6 @@
 /// What is logged, how often and how long it can wait for the card: one table, one ring a row.
 #pragma once
 
-#include <algorithm>
 #include <tuple>
 
 #include "DataTypes.h"
@@ -17,15 +16,15 @@ constexpr std::uint32_t kLogSyncRateHz = 2;    ///< and made durable this often
 /// @tparam RateHz    how often it is offered
 /// @tparam KeepOneIn thins it out: the first of every so many is logged
 /// @tparam BufferMs  how long a stall of the card it survives
-template <class Topic_, std::uint8_t Instance_, std::size_t RateHz, std::size_t KeepOneIn,
+template <class TopicT, std::uint8_t Instance, std::size_t RateHz, std::size_t KeepOneIn,
           std::size_t BufferMs>
 class LogStream {
  public:
-  using Topic = Topic_;
-  static constexpr std::uint8_t kInstance = Instance_;
+  using Topic = TopicT;
+  static constexpr std::uint8_t kInstance = Instance;
   static constexpr std::size_t kMessageSize = ulog::kDataHeader + kPayloadSize<Topic>;
-  static constexpr std::size_t kRecords =
-      std::max(std::size_t{8}, RateHz* BufferMs / 1000 / KeepOneIn);
+  static constexpr std::size_t kLogged = RateHz * BufferMs / 1000 / KeepOneIn;
+  static constexpr std::size_t kRecords = kLogged < 8 ? 8 : kLogged;  // room for a burst
   static constexpr std::size_t kBytesPerSecond = RateHz * kMessageSize / KeepOneIn;
 
   static_assert(kMessageSize <= ulog::kMaxMessage);
@@ -72,7 +71,7 @@ using LogStreams = std::tuple<
     LogStream<topic::VehicleAngularVelocity, 0,     500,         1,      2000>,
     LogStream<topic::VehicleLocalPosition,   0,     500,         5,      2000>,
     LogStream<topic::EstimatorStd,           0,      50,         1,      2000>,
-    LogStream<topic::EstimatorAidSource,     0,     100,         1,      2000>,  // tilt
+    LogStream<topic::EstimatorAidSource,     0,    1000,        10,      2000>,  // tilt
     LogStream<topic::EstimatorAidSource,     1,     100,         1,      2000>,  // magnetometer
     LogStream<topic::EstimatorAidSource,     2,      50,         1,      2000>,  // altimeter
     LogStream<topic::EstimatorAidSource,     3,      10,         1,      2000>,  // GPS
@@ -89,7 +88,8 @@ using LogStreams = std::tuple<
 
 constexpr std::size_t kLogStreamCount = std::tuple_size_v<LogStreams>;
 static_assert(std::tuple_size_v<decltype(topic::LogStatus::dropped_by_id)> == kLogStreamCount);
-static_assert(sizeof(LogStreams) < 380 * 1024, "the rings share the Teensy's 512 KB RAM2");
+static_assert(sizeof(LogStreams) < std::size_t{380} * 1024,
+              "the rings share the Teensy's 512 KB RAM2");
 
 /// log_block goes into the stream without a ring, under the id after the last stream's.
 constexpr auto kLogBlockId = static_cast<std::uint16_t>(kLogStreamCount);

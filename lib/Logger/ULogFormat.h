@@ -61,14 +61,10 @@ class Message {
 };
 
 /// 'B': no optional feature of the format is used, nothing was appended.
-[[nodiscard]] inline Message flagBits() {
-  return Message('B').add(std::array<std::uint8_t, 40>{});
-}
+[[nodiscard]] inline Message flagBits() { return Message('B').add(std::array<std::uint8_t, 40>{}); }
 
 /// 'F': the fields of a topic.
-[[nodiscard]] inline Message format(std::string_view text) {
-  return Message('F').addText(text);
-}
+[[nodiscard]] inline Message format(std::string_view text) { return Message('F').addText(text); }
 
 /// 'A': gives one instance of a topic the id that its data messages carry.
 [[nodiscard]] inline Message subscription(std::uint16_t id, std::uint8_t instance,

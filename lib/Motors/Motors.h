@@ -69,8 +69,8 @@ class Motors {
     achieved_ = wrenchOf(squares);
   }
 
-  /// Squared speeds for a finite wrench: exact when they can be within the limits; otherwise roll and
-  /// pitch torque are kept first, then thrust, then yaw torque, none of them changing its sign.
+  /// Squared speeds for a finite wrench: exact when they can be within the limits; otherwise roll
+  /// and pitch torque are kept first, then thrust, then yaw torque; no torque changes its sign.
   [[nodiscard]] SquaredSpeeds allocateControl(const Wrench& wanted) const {
     SquaredSpeeds tilting{};  // share of roll and pitch torque
     SquaredSpeeds turning{};  // share of yaw torque
@@ -91,8 +91,7 @@ class Motors {
     // Thrust: the nearest that some part f of the yaw torque, 0 <= f <= 1, allows.
     const float mostThrust = squareMax_ - lowestPeak(tilting, turning, 1.0F);
     const float leastThrust = squareMin_ + lowestPeak(tilting, turning, -1.0F);
-    const float level =
-        clamp(inverse_[kThrust][0] * wanted.thrust, leastThrust, mostThrust);
+    const float level = clamp(inverse_[kThrust][0] * wanted.thrust, leastThrust, mostThrust);
 
     // Yaw: the largest part that keeps every motor within its limits.
     float part = 1.0F;
@@ -159,7 +158,7 @@ class Motors {
     float high;
   };
 
-  /// False for NaN and for what no model aircraft could mean, N or N m; within it nothing overflows.
+  /// False for NaN and beyond any sense (N or N m); what is left overflows nowhere.
   [[nodiscard]] static bool plausible(float value) { return value > -1e6F && value < 1e6F; }
 
   [[nodiscard]] static float smaller(float a, float b) { return b < a ? b : a; }

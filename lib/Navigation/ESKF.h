@@ -32,7 +32,8 @@ class ESKF {
   /// @param accel  the sample given to predict, m/s^2, body
   void updateTiltMeas(const Vector3f& accel);
 
-  /// Three-axis magnetic field.
+  /// Three-axis magnetic field. Like height, not used before the first prediction: until then no
+  /// time is known from which `now` counts.
   /// @param mag  uT, body
   void updateMagMeas(const Vector3f& mag, Micros now);
 
@@ -42,6 +43,9 @@ class ESKF {
   /// GPS fix in the local frame. A fix of age tau measured p - v tau.
   /// @param positionNed  m; down is not used    @param velocityNed  m/s; down is not used
   void updateGPSMeas(const Vector3f& positionNed, const Vector3f& velocityNed);
+
+  /// The aircraft does not move: v = 0, three scalars (ZUPT). Never from a sensor in flight.
+  void updateStandstill();
 
   /// Moves dx into the nominal state and clears it. The reset Jacobian I - [alpha/2 x] (Sola,
   /// eq. 287) is taken as I: alpha is a few mrad a pass.
@@ -95,6 +99,7 @@ class ESKF {
   Innovation mag_;
   Innovation alt_;
   Innovation gps_;
+  Innovation standstill_;
   float gravity_ = kGravity;
   float dt_ = 0.0F;  ///< s, of the last prediction
   Micros lastPredict_ = 0;
@@ -224,7 +229,7 @@ inline void ESKF::updateMagMeas(const Vector3f& mag, Micros now) {
   mag_.begin();
   const Micros since = elapsed(now, lastMag_);
   lastMag_ = now;
-  if (magReference_.isZero(0.0F) || since == 0) return;
+  if (!started_ || magReference_.isZero(0.0F) || since == 0) return;
   const float dt = toSeconds(since < kMaxPredictStep ? since : kMaxPredictStep);
   const Vector3f predicted = rotateToBody(state_.attitude, magReference_);
   updateDirection(mag_, mag, predicted, config_.mag.variance(dt));
@@ -234,7 +239,7 @@ inline void ESKF::updateAltMeas(float height, Micros now) {
   alt_.begin();
   const Micros since = elapsed(now, lastAlt_);
   lastAlt_ = now;
-  if (since == 0) return;
+  if (!started_ || since == 0) return;
   const float dt = toSeconds(since < kMaxPredictStep ? since : kMaxPredictStep);
   scalarGPSAltUpdate(alt_, -height - state_.positionNed.z(), kPosition + 2,
                      config_.alt.variance(dt));
@@ -251,6 +256,14 @@ inline void ESKF::updateGPSMeas(const Vector3f& positionNed, const Vector3f& vel
   }
   for (int axis = 0; axis < 2; ++axis) {
     scalarGPSAltUpdate(gps_, velocityNed(axis) - state_.velocityNed(axis), kVelocity + axis, rv);
+  }
+}
+
+inline void ESKF::updateStandstill() {
+  standstill_.begin();
+  const float variance = config_.standstillSigma * config_.standstillSigma;
+  for (int axis = 0; axis < 3; ++axis) {
+    scalarGPSAltUpdate(standstill_, -state_.velocityNed(axis), kVelocity + axis, variance);
   }
 }
 

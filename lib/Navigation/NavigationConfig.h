@@ -36,6 +36,7 @@ struct NavigationConfig {
   MeasurementNoise alt{0.3F, 0.0F};     ///< m
   float gpsPositionSigma = 3.0F;        ///< m, north and east
   float gpsVelocitySigma = 0.3F;        ///< m/s, north and east
+  float standstillSigma = 0.05F;        ///< m/s, of v = 0 while the aircraft stands on the ground
   Micros gpsDelay = 0;                  ///< age of a fix when it arrives
 
   float nisGate = 6.635F;  ///< chi-square, 1 dof, 99 %

@@ -52,7 +52,11 @@ class SensorTiming {
   }
   [[nodiscard]] bool due(Micros now) const { return task_.due(now); }
   void received(Micros now) {
-    task_.done(now);
+    if (lost_) {
+      task_.postpone(now);  // a device has its own phase: the wait for its first word is no overrun
+    } else {
+      task_.done(now);
+    }
     heard_ = now;
     lost_ = false;
   }

@@ -148,7 +148,7 @@ bool SdCard::flushHeld() {
   return writable_;
 }
 
-bool SdCard::sync(std::uint32_t /*length*/) { return writable_; }
+bool SdCard::sync(std::uint32_t /*length*/) const { return writable_; }
 
 bool SdCard::finish(std::uint32_t length) {
   if (!writable_) return false;

@@ -35,7 +35,7 @@ class SdCard {
 
   /// Waits for nothing. What the card has taken survives a power cut as soon as the card has
   /// programmed it; the sector held back does not. Bound: 1 us.
-  [[nodiscard]] bool sync(std::uint32_t length);
+  [[nodiscard]] bool sync(std::uint32_t length) const;
 
   /// Ends the log: the file is `length` bytes long and closed. On the ground, motors off: takes
   /// 20 ms; bound: 3 s. Then the card takes nothing more until the next start.

@@ -54,15 +54,16 @@ class BasicFakeBoard {
   };
 
   // Set by the test.
-  FakeDevice<ImuRaw> imu{889};      ///< 1125 Hz, as the ICM20649 has it
+  FakeDevice<ImuRaw> imu{889};  ///< 1125 Hz, as the ICM20649 has it
   FakeDevice<MagRaw> mag{10'000};
   FakeDevice<AltRaw> alt{20'000};
   FakeDevice<GpsRaw> gps{100'000};
   SensorSet found{true, true, true, true, true};  ///< what begin() reports
   PilotSwitches pilot;
   Card sd;
-  Vector3f gyroBias{0.01F, -0.02F, 0.015F};  ///< rad/s; used by hold()
-  Vector3f fieldNed{15.6F, 1.1F, 48.0F};     ///< uT, southern Sweden; used by hold()
+  Vector3f gyroBias{0.01F, -0.02F, 0.015F};     ///< rad/s; used by hold()
+  Vector3f fieldNed{15.6F, 1.1F, 48.0F};        ///< uT, southern Sweden; used by hold()
+  Matrix3f magMounting = Matrix3f::Identity();  ///< body to sensor axes; used by hold()
 
   // Read by the test.
   std::uint32_t clockReads = 0;
@@ -74,9 +75,9 @@ class BasicFakeBoard {
     hold(Quaternion{});
     alt.reading.pressure = 100'800.0F;
     alt.reading.temperature = 25.0F;
-    gps.reading.latitude = 574'200'000;   // deg 1e-7
+    gps.reading.latitude = 574'200'000;  // deg 1e-7
     gps.reading.longitude = 119'700'000;
-    gps.reading.altitude = 40'000;        // mm
+    gps.reading.altitude = 40'000;  // mm
     gps.reading.hdop = 0.9F;
     gps.reading.fix = 3;
     gps.reading.satellites = 11;
@@ -87,7 +88,7 @@ class BasicFakeBoard {
   void hold(const Quaternion& attitude, const Vector3f& rate = Vector3f::Zero()) {
     imu.reading.accel = rotateToBody(attitude, {0.0F, 0.0F, -kGravity});
     imu.reading.gyro = gyroBias + rate;
-    mag.reading.field = rotateToBody(attitude, fieldNed);
+    mag.reading.field = magMounting * rotateToBody(attitude, fieldNed);
   }
 
   void advance(Micros step) {

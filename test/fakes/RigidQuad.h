@@ -29,8 +29,8 @@ class RigidQuad {
       force += pull;
       torque += Eigen::Vector3d(rotor.x, rotor.y, 0.0).cross(pull);
       // Clockwise from above is positive about z, down; the air's drag on the propeller is not.
-      torque.z() += (rotor.spin == strix::Spin::Clockwise ? -1.0 : 1.0) *
-                    vehicle_.torqueConstant * square;
+      torque.z() +=
+          (rotor.spin == strix::Spin::Clockwise ? -1.0 : 1.0) * vehicle_.torqueConstant * square;
     }
     const Eigen::Vector3d inertia(vehicle_.inertia[0], vehicle_.inertia[1], vehicle_.inertia[2]);
     const Eigen::Vector3d momentum = inertia.cwiseProduct(rate);
@@ -45,7 +45,9 @@ class RigidQuad {
   /// What a perfect estimator would say.
   [[nodiscard]] strix::VehicleState state() const {
     const Eigen::Quaternionf q = attitude_.cast<float>();
-    return {position.cast<float>(), velocity.cast<float>(), {q.w(), q.x(), q.y(), q.z()},
+    return {position.cast<float>(),
+            velocity.cast<float>(),
+            {q.w(), q.x(), q.y(), q.z()},
             rate.cast<float>()};
   }
 

@@ -65,8 +65,8 @@ void test_the_aircraft_starts_in_boot_with_everything_off() {
 
 void test_motors_are_off_in_boot_idle_and_safe_and_on_elsewhere() {
   for (const FlightState state : kAllStates) {
-    const bool off = state == FlightState::Boot || state == FlightState::Idle ||
-                     state == FlightState::Safe;
+    const bool off =
+        state == FlightState::Boot || state == FlightState::Idle || state == FlightState::Safe;
     TEST_ASSERT_TRUE(motorsOn(state) == !off);
     TEST_ASSERT_TRUE(((kMotorsOn & in(state)) != 0) == !off);
     const FiniteStateMachine machine = machineIn(state);
@@ -107,9 +107,8 @@ void test_one_update_takes_at_most_one_transition() {
 
 void test_each_critical_condition_stops_the_motors_whatever_else_is_there() {
   ConditionSet critical = 0;
-  for (const ConditionSet one :
-       {condition::kKill, condition::kUpset, condition::kOutsideFence, condition::kImuLost,
-        condition::kEstimatorUnhealthy}) {
+  for (const ConditionSet one : {condition::kKill, condition::kUpset, condition::kOutsideFence,
+                                 condition::kImuLost, condition::kEstimatorUnhealthy}) {
     critical |= one;
     forAll([one](FlightState state, ConditionSet set) {
       if (!motorsOn(state) || (set & one) == 0) return;
@@ -159,8 +158,7 @@ void test_boot_is_left_only_when_calibrated_and_only_to_idle() {
 
 void test_a_refused_arming_is_told_in_every_state_on_the_ground() {
   for (const FlightState state : {FlightState::Boot, FlightState::Idle, FlightState::Safe}) {
-    const Transition* row =
-        findTransition(state, condition::kArmEdge | condition::kPreArmFailure);
+    const Transition* row = findTransition(state, condition::kArmEdge | condition::kPreArmFailure);
     TEST_ASSERT_NOT_NULL(row);
     TEST_ASSERT_TRUE(row->to == state);
     TEST_ASSERT_EQUAL_STRING("arming refused", row->said);

@@ -71,6 +71,7 @@ class LogFlight {
   void feed() {
     if (pass_ == 0) offered_.clear();
     give<topic::SensorCombined>();
+    give<topic::EstimatorAidSource, 0>(10);
     if (pass_ % 2 == 0) {  // logGNC, record by record
       give<topic::VehicleAttitude>();
       give<topic::VehicleAngularVelocity>();
@@ -84,7 +85,6 @@ class LogFlight {
     }
     if (pass_ % 10 == 0) {
       give<topic::SensorMag>();
-      give<topic::EstimatorAidSource, 0>();
       give<topic::EstimatorAidSource, 1>();
     }
     if (pass_ % 20 == 0) {

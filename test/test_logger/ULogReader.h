@@ -13,8 +13,8 @@
 struct ULogFile {
   struct Field {
     std::string type;
-    std::size_t count;
-    std::size_t offset;
+    std::size_t count = 0;
+    std::size_t offset = 0;
   };
   struct Format {
     std::map<std::string, Field> fields;
@@ -22,7 +22,7 @@ struct ULogFile {
   };
   struct Subscription {
     std::string topic;
-    int instance;
+    int instance = 0;
   };
   struct Record {
     std::uint16_t id;

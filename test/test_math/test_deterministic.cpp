@@ -33,7 +33,8 @@ struct Errors {
 double ulpOf(double exact) {
   auto magnitude = static_cast<float>(std::fabs(exact));
   if (magnitude < kSmallestNormal) magnitude = kSmallestNormal;
-  return static_cast<double>(std::nextafterf(magnitude, kInfinity)) - static_cast<double>(magnitude);
+  return static_cast<double>(std::nextafterf(magnitude, kInfinity)) -
+         static_cast<double>(magnitude);
 }
 
 void note(Errors& worst, float value, double exact) {
@@ -103,7 +104,8 @@ void test_exact_points_are_exact() {
   TEST_ASSERT_TRUE(sine(kHalfPi) == 1.0F && cosine(kPi) == -1.0F);
   TEST_ASSERT_TRUE(arcTangent(0.0F) == 0.0F && arcTangent(kInfinity) == kHalfPi);
   TEST_ASSERT_TRUE(arcSine(0.0F) == 0.0F && arcSine(1.0F) == kHalfPi && arcSine(-1.0F) == -kHalfPi);
-  TEST_ASSERT_TRUE(arcCosine(1.0F) == 0.0F && arcCosine(-1.0F) == kPi && arcCosine(0.0F) == kHalfPi);
+  TEST_ASSERT_TRUE(arcCosine(1.0F) == 0.0F && arcCosine(-1.0F) == kPi &&
+                   arcCosine(0.0F) == kHalfPi);
   TEST_ASSERT_TRUE(arcTangent2(0.0F, 0.0F) == 0.0F && arcTangent2(0.0F, 1.0F) == 0.0F);
   TEST_ASSERT_TRUE(arcTangent2(1.0F, 0.0F) == kHalfPi && arcTangent2(-1.0F, 0.0F) == -kHalfPi);
   TEST_ASSERT_TRUE(arcTangent2(0.0F, -1.0F) == kPi);

@@ -160,7 +160,8 @@ void test_injection_moves_the_attitude_by_the_error() {
 }
 
 void test_the_attitude_error_is_the_estimate_seen_from_the_reference() {
-  // Rolled right of the reference: positive about x. Nose up: positive about y. Nose right: about z.
+  // Rolled right of the reference: positive about x. Nose up: positive about y. Nose right: about
+  // z.
   const float angle = 0.2F;
   const float size = 2.0F * sine(0.5F * angle);
   const Quaternion level{};

@@ -183,8 +183,8 @@ void test_the_cross_product_matrix_crosses() {
 
 void test_a_vector_with_nan_or_infinity_anywhere_is_not_finite() {
   for (int i = 0; i < 3; ++i) {
-    for (const float bad : {kNaN, std::numeric_limits<float>::infinity(),
-                            -std::numeric_limits<float>::infinity()}) {
+    for (const float bad :
+         {kNaN, std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()}) {
       Vector3f v{1.0F, -2.0F, 3e38F};
       TEST_ASSERT_TRUE(isFinite(v));
       v(i) = bad;

@@ -48,8 +48,8 @@ float weight(const Vehicle& vehicle) { return vehicle.mass * kGravity; }
 struct Limits {
   explicit Limits(const Vehicle& v) {
     const double above = static_cast<double>(v.commandFlightMax) - v.command.offset;
-    const double top =
-        v.command.quadratic == 0.0F ? above / v.command.linear : std::sqrt(above / v.command.quadratic);
+    const double top = v.command.quadratic == 0.0F ? above / v.command.linear
+                                                   : std::sqrt(above / v.command.quadratic);
     low = static_cast<double>(v.speedFlightMin) * v.speedFlightMin;
     high = top * top;
   }
@@ -60,7 +60,8 @@ struct Limits {
 /// Largest wrench on each axis that the rotors can give about the middle of their range.
 Eigen::Vector4d authority(const Vehicle& vehicle) {
   const Limits limits(vehicle);
-  return denseEffect(vehicle).cwiseAbs() * Eigen::Vector4d::Constant(0.5 * (limits.high - limits.low));
+  return denseEffect(vehicle).cwiseAbs() *
+         Eigen::Vector4d::Constant(0.5 * (limits.high - limits.low));
 }
 
 void test_more_thrust_on_the_left_rolls_right_in_front_pitches_up_and_against_the_spin_yaws() {
@@ -74,7 +75,7 @@ void test_more_thrust_on_the_left_rolls_right_in_front_pitches_up_and_against_th
     const float even = motors.allocateControl(wrench(hover, 0.0, 0.0, 0.0))[0];
     for (std::size_t i = 0; i < kMotorCount; ++i) {
       const Rotor& rotor = vehicle.rotors[i];
-      TEST_ASSERT_EQUAL(rotor.y < 0.0F, roll[i] > even);   // FRD: left is -y, right side down is +
+      TEST_ASSERT_EQUAL(rotor.y<0.0F, roll[i]> even);      // FRD: left is -y, right side down is +
       TEST_ASSERT_EQUAL(rotor.x > 0.0F, pitch[i] > even);  // front is +x, nose up is +
       TEST_ASSERT_EQUAL(rotor.spin == Spin::CounterClockwise, yaw[i] > even);  // nose right is +
     }
@@ -116,8 +117,8 @@ void test_allocation_agrees_with_a_dense_solve_and_gives_back_the_wrench() {
     const Eigen::Vector4d most = authority(vehicle);
     const double middle = (effect * Eigen::Vector4d::Constant(0.5 * (limits.low + limits.high)))[0];
     for (int trial = 0; trial < 1000; ++trial) {
-      const Wrench wanted = wrench(middle + part() * most[0], part() * most[1],
-                                   part() * most[2], part() * most[3]);
+      const Wrench wanted =
+          wrench(middle + part() * most[0], part() * most[1], part() * most[2], part() * most[3]);
       const SquaredSpeeds squares = motors.allocateControl(wanted);
       const Eigen::Vector4d expected = effect.fullPivLu().solve(stack(wanted));
       // A few float roundings of the largest term.
@@ -181,8 +182,9 @@ void test_a_saturated_aircraft_keeps_roll_and_pitch_then_thrust_then_yaw() {
               TEST_ASSERT_TRUE(missed > std::abs(got[0] - w[0]) - slack[0]);
               const bool fits = got[0] * inverse(0, 0) > bottom + rounding &&
                                 got[0] * inverse(0, 0) < top - rounding;
-              if (fits) TEST_ASSERT_TRUE(got[3] * (w[3] < 0.0 ? -1.0 : 1.0) >
-                                         (f - yawRounding) * std::abs(w[3]) - slack[3]);
+              if (fits)
+                TEST_ASSERT_TRUE(got[3] * (w[3] < 0.0 ? -1.0 : 1.0) >
+                                 (f - yawRounding) * std::abs(w[3]) - slack[3]);
             }
           }
         }
@@ -267,10 +269,10 @@ void test_a_wrench_that_is_not_a_number_never_reaches_an_esc_and_is_counted() {
   Motors motors(kQuad5in);
   motors.arm();
   const Wrench bad[] = {
-      {kNaN, Vector3f::Zero()},           {8.0F, {kNaN, 0.0F, 0.0F}},
-      {8.0F, {0.0F, kNaN, 0.0F}},         {8.0F, {0.0F, 0.0F, kNaN}},
-      {kInfinity, Vector3f::Zero()},      {-kInfinity, Vector3f::Zero()},
-      {8.0F, {0.0F, kInfinity, 0.0F}},    {std::numeric_limits<float>::max(), {0.0F, 0.0F, 0.0F}},
+      {kNaN, Vector3f::Zero()},        {8.0F, {kNaN, 0.0F, 0.0F}},
+      {8.0F, {0.0F, kNaN, 0.0F}},      {8.0F, {0.0F, 0.0F, kNaN}},
+      {kInfinity, Vector3f::Zero()},   {-kInfinity, Vector3f::Zero()},
+      {8.0F, {0.0F, kInfinity, 0.0F}}, {std::numeric_limits<float>::max(), {0.0F, 0.0F, 0.0F}},
   };
   std::uint32_t count = 0;
   for (const Wrench& wanted : bad) {
@@ -304,7 +306,8 @@ void test_the_command_curves_are_the_published_ones() {
 }
 
 void test_the_weight_is_carried_at_hover() {
-  // 0.83 kg x 9.80665 / (4 x 6.583e-5) = 175.82^2 (rev/s)^2: 1195 + 30911 / 160000 x 755 = 1340.9 us
+  // 0.83 kg x 9.80665 / (4 x 6.583e-5) = 175.82^2 (rev/s)^2: 1195 + 30911 / 160000 x 755 = 1340.9
+  // us
   Motors quad(kQuad5in);
   quad.arm();
   quad.commandControl(wrench(weight(kQuad5in), 0.0, 0.0, 0.0));

@@ -97,7 +97,8 @@ inline Posterior batchUpdate(const Matrix9d& p, const Eigen::MatrixXd& h,
                              const Eigen::VectorXd& innovation, const Eigen::VectorXd& variance) {
   const Eigen::MatrixXd r = variance.asDiagonal();
   const Eigen::MatrixXd s = h * p * h.transpose() + r;
-  const Eigen::MatrixXd gain = p * h.transpose() * s.llt().solve(Eigen::MatrixXd::Identity(s.rows(), s.rows()));
+  const Eigen::MatrixXd gain =
+      p * h.transpose() * s.llt().solve(Eigen::MatrixXd::Identity(s.rows(), s.rows()));
   return {gain * innovation, (Matrix9d::Identity() - gain * h) * p};
 }
 

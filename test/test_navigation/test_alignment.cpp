@@ -15,9 +15,8 @@ void test_alignment_recovers_any_attitude_from_gravity_and_field() {
     for (int pitch = -80; pitch <= 80; pitch += 20) {
       for (int yaw = -180; yaw <= 180; yaw += 45) {
         const Quaterniond truth = fromEuler(roll, pitch, yaw);
-        const strix::Alignment found =
-            strix::alignStill(toFloat(restForce(truth)),
-                              toFloat(truth.conjugate() * kFieldMagneticNorth), 0.0F);
+        const strix::Alignment found = strix::alignStill(
+            toFloat(restForce(truth)), toFloat(truth.conjugate() * kFieldMagneticNorth), 0.0F);
         // Float rounding of the inputs, 1e-7, is magnified by 1/cos(80 deg) = 6 and by the dip.
         TEST_ASSERT_TRUE(angleDeg(truth, toDouble(found.attitude)) < 1e-3);
       }
@@ -29,8 +28,8 @@ void test_declination_turns_the_reference_and_not_the_measurement() {
   const double declinationDeg = 11.7;
   const Quaterniond truth = fromEuler(5.0, -8.0, 70.0);
   const strix::Vector3f mag = toFloat(truth.conjugate() * fieldNed(declinationDeg));
-  const strix::Alignment found = strix::alignStill(toFloat(restForce(truth)), mag,
-                                                   static_cast<float>(declinationDeg * kDeg));
+  const strix::Alignment found =
+      strix::alignStill(toFloat(restForce(truth)), mag, static_cast<float>(declinationDeg * kDeg));
   TEST_ASSERT_TRUE(angleDeg(truth, toDouble(found.attitude)) < 1e-3);
   const Vector3d reference = found.magReference.cast<double>();
   TEST_ASSERT_TRUE((reference - fieldNed(declinationDeg)).norm() < 1e-4);  // uT, of 50

@@ -69,8 +69,8 @@ void test_the_process_noise_equals_the_integral_with_its_cross_terms() {
   const strix::NavigationConfig config;
   const strix::ESKF filter(config);
   for (const double dt : {1e-3, 0.02, 0.2}) {
-    const strix::Matrix9f found = filter.getQd(nedToBody(kAttitude), toFloat(kAccel),
-                                               toFloat(kGyro), static_cast<float>(dt));
+    const strix::Matrix9f found =
+        filter.getQd(nedToBody(kAttitude), toFloat(kAccel), toFloat(kGyro), static_cast<float>(dt));
     const Matrix9d expected =
         processNoise(systemMatrix(kAttitude, kAccel, kGyro), static_cast<double>(config.accelNoise),
                      static_cast<double>(config.gyroNoise), dt);
@@ -86,7 +86,8 @@ strix::ESKF livelyFilter() {
   for (int i = 0; i < 500; ++i, now += kStep) {
     filter.predict(toFloat(kAccel), toFloat(kGyro), now);
     const strix::VehicleState& state = filter.state();
-    if (i % 10 == 0) filter.updateMagMeas(strix::rotateToBody(state.attitude, filter.magReference()), now);
+    if (i % 10 == 0)
+      filter.updateMagMeas(strix::rotateToBody(state.attitude, filter.magReference()), now);
     if (i % 100 == 0) filter.updateGPSMeas(state.positionNed, state.velocityNed);
     filter.injectError();
   }
@@ -120,9 +121,9 @@ void test_predict_moves_the_state_as_the_double_precision_model() {
     truth = truth.moved(kAccel, kGyro, kDt);
   }
   // 2000 roundings of 6e-8 add up as a random walk to 3e-6; position and velocity are ~ 15.
-  TEST_ASSERT_TRUE(angleDeg(truth.attitude, toDouble(filter.state().attitude)) < 1e-2);
-  TEST_ASSERT_TRUE((truth.velocity - filter.state().velocityNed.cast<double>()).norm() < 1e-2);
-  TEST_ASSERT_TRUE((truth.position - filter.state().positionNed.cast<double>()).norm() < 1e-2);
+  TEST_ASSERT_TRUE(angleDeg(truth.attitude, toDouble(filter.state().attitude)) < 1e-3);
+  TEST_ASSERT_TRUE((truth.velocity - filter.state().velocityNed.cast<double>()).norm() < 1e-3);
+  TEST_ASSERT_TRUE((truth.position - filter.state().positionNed.cast<double>()).norm() < 1e-3);
 }
 
 void test_a_gap_counts_as_the_longest_step_and_no_more() {

@@ -131,8 +131,9 @@ void test_a_rejected_component_changes_neither_state_nor_covariance() {
   TEST_ASSERT_EQUAL(2, filter.magInnovation().accepted);
   // What is left is the update with the other two components.
   Batch all;
-  all.addDirection(spike, field,
-                   static_cast<double>(config.mag.variance(strix::toSeconds(strix::kMaxPredictStep))));
+  all.addDirection(
+      spike, field,
+      static_cast<double>(config.mag.variance(strix::toSeconds(strix::kMaxPredictStep))));
   Batch good;
   for (const std::size_t axis : {0U, 2U}) {
     good.add(all.rows[axis], all.innovations[axis], all.variances[axis]);
@@ -173,7 +174,8 @@ void test_a_measurement_that_is_not_a_number_changes_nothing() {
   for (const float bad : {NAN, INFINITY, -INFINITY}) {
     const Vector3f vector = Vector3f::Constant(bad);
     assertChangesNothing([&](strix::ESKF& filter) { filter.updateTiltMeas(vector); });
-    assertChangesNothing([&](strix::ESKF& filter) { filter.updateMagMeas(vector, kEpoch + 1'000); });
+    assertChangesNothing(
+        [&](strix::ESKF& filter) { filter.updateMagMeas(vector, kEpoch + 1'000); });
     assertChangesNothing([&](strix::ESKF& filter) { filter.updateAltMeas(bad, kEpoch + 1'000); });
     assertChangesNothing([&](strix::ESKF& filter) { filter.updateGPSMeas(vector, vector); });
   }
@@ -202,6 +204,19 @@ void test_a_gps_fix_is_compared_with_the_position_at_its_own_time() {
   }
 }
 
+void test_at_standstill_the_velocity_goes_and_the_heading_stays() {
+  strix::ESKF filter = filterAt(kAttitude, kMagReference);
+  const Vector3f accel = toFloat(restForce(kAttitude)) + Vector3f(0.1F, -0.05F, 0.05F);
+  for (Micros now = 0; now <= kEpoch; now += 1'000) filter.predict(accel, Vector3f::Zero(), now);
+  const strix::VehicleState before = filter.state();
+  TEST_ASSERT_TRUE(before.velocityNed.norm() > 0.1F);
+  filter.updateStandstill();
+  filter.injectError();
+  TEST_ASSERT_TRUE(filter.state().velocityNed.norm() < 0.3F * before.velocityNed.norm());
+  TEST_ASSERT_TRUE(std::abs(headingBetweenDeg(toDouble(before.attitude),
+                                              toDouble(filter.state().attitude))) < 0.5);
+}
+
 void test_information_grows_with_time_and_not_with_the_rate_of_a_sensor() {
   const strix::MeasurementNoise noise{0.0F, 0.5F};
   // n samples a second: variance of their mean.
@@ -221,5 +236,6 @@ void runUpdateTests() {
   RUN_TEST(test_a_measurement_that_is_not_a_number_changes_nothing);
   RUN_TEST(test_tilt_is_used_only_while_the_specific_force_is_g_long);
   RUN_TEST(test_a_gps_fix_is_compared_with_the_position_at_its_own_time);
+  RUN_TEST(test_at_standstill_the_velocity_goes_and_the_heading_stays);
   RUN_TEST(test_information_grows_with_time_and_not_with_the_rate_of_a_sensor);
 }

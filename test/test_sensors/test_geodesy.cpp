@@ -16,10 +16,10 @@ constexpr double kPiDouble = 3.14159265358979323846;
 
 /// The barometric formula of the International Standard Atmosphere, from its defining constants.
 double heightOf(double pressure, double ground) {
-  constexpr double kGas = 8.31432;        // J/(mol K), the standard's value
-  constexpr double kMolar = 0.0289644;    // kg/mol
-  constexpr double kLapse = 0.0065;       // K/m
-  constexpr double kTemperature = 288.15; // K
+  constexpr double kGas = 8.31432;         // J/(mol K), the standard's value
+  constexpr double kMolar = 0.0289644;     // kg/mol
+  constexpr double kLapse = 0.0065;        // K/m
+  constexpr double kTemperature = 288.15;  // K
   return kTemperature / kLapse *
          (1.0 - std::pow(pressure / ground, kGas * kLapse / (9.80665 * kMolar)));
 }
@@ -28,7 +28,8 @@ void test_height_follows_the_barometric_formula() {
   for (const float ground : {101325.0F, 85'000.0F, 104'000.0F}) {
     for (float pressure = 40'000.0F; pressure < 108'000.0F; pressure += 7.3F) {
       // exp and log are good to 1e-7, times 44 km.
-      TEST_ASSERT_FLOAT_WITHIN(0.02F, heightOf(static_cast<double>(pressure), static_cast<double>(ground)),
+      TEST_ASSERT_FLOAT_WITHIN(0.02F,
+                               heightOf(static_cast<double>(pressure), static_cast<double>(ground)),
                                heightFromPressure(pressure, ground));
     }
   }
@@ -121,9 +122,9 @@ double worstError(const GeoPoint& origin, double reach) {
                          origin.altitude + static_cast<std::int32_t>(random.uniform(-5e4F, 5e4F))};
     const Ned exact = nedOf(origin, point);
     const Vector3f ned = frame.toNed(point);
-    for (const double error : {exact.north - static_cast<double>(ned.x()),
-                               exact.east - static_cast<double>(ned.y()),
-                               exact.down - static_cast<double>(ned.z())}) {
+    for (const double error :
+         {exact.north - static_cast<double>(ned.x()), exact.east - static_cast<double>(ned.y()),
+          exact.down - static_cast<double>(ned.z())}) {
       if (!(std::fabs(error) <= worst)) worst = std::fabs(error);
     }
   }

@@ -200,7 +200,8 @@ void test_position_counts_from_the_origin() {
   raw.latitude += 1000;
   raw.altitude += 2000;
   const Vector3f p = bench.sensors.processGPSMeas(raw).positionNed;
-  TEST_ASSERT_FLOAT_WITHIN(0.1F, 11.1F, p.x());  // 1e-4 deg: 1/900 000 of a quarter meridian, 10^7 m
+  TEST_ASSERT_FLOAT_WITHIN(0.1F, 11.1F,
+                           p.x());  // 1e-4 deg: 1/900 000 of a quarter meridian, 10^7 m
   TEST_ASSERT_FLOAT_WITHIN(1e-3F, -2.0F, p.z());
 }
 

@@ -10,10 +10,10 @@ using namespace strix;
 
 namespace {
 
-const Vector3f kBias{0.05F, -0.03F, 0.02F};    // rad/s; the ICM20649 promises 0.087
-const Vector3f kRest{0.3F, -0.2F, -9.8F};      // m/s^2, nearly level
-const Vector3f kField{15.0F, 3.0F, 48.0F};     // uT
-constexpr float kPressure = 100'800.0F;        // Pa
+const Vector3f kBias{0.05F, -0.03F, 0.02F};  // rad/s; the ICM20649 promises 0.087
+const Vector3f kRest{0.3F, -0.2F, -9.8F};    // m/s^2, nearly level
+const Vector3f kField{15.0F, 3.0F, 48.0F};   // uT
+constexpr float kPressure = 100'800.0F;      // Pa
 constexpr Micros kBeforeWrap = 0U - 1'000'000U;
 
 /// An aircraft on the ground, its IMU at 1000 Hz, magnetometer 100 Hz, altimeter 50 Hz.
@@ -34,7 +34,8 @@ struct Ground {
     calibration.addImu(now, kRest + random.vector(0.05F) + extraAccel,
                        kBias + random.vector(0.0054F) + extraGyro);
     if (magAlive && sample % 10 == 0) calibration.addMag(kField + random.vector(0.5F));
-    if (altAlive && sample % 20 == 0) calibration.addPressure(kPressure + random.uniform(-3.5F, 3.5F));
+    if (altAlive && sample % 20 == 0)
+      calibration.addPressure(kPressure + random.uniform(-3.5F, 3.5F));
     ++sample;
     now += 1000;
   }

@@ -5,11 +5,14 @@ Standard library only, and readable by any Python 3.7: it runs before anything i
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import os
 import shutil
 import subprocess
 import sys
 import sysconfig
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NoReturn
 
@@ -25,6 +28,19 @@ def fail(message: str) -> NoReturn:
 
 def say(message: str) -> None:
     print(f"setup: {message}", flush=True)
+
+
+@contextlib.contextmanager
+def alone(name: str) -> Iterator[None]:
+    """Two runs at once take turns here. The lock is freed however the one before us ended."""
+    (ROOT / "build").mkdir(exist_ok=True)
+    with (ROOT / "build" / f"{name}.lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            say(f"waiting for another run of make (build/{name}.lock)")
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def use_supported_python() -> None:

@@ -4,13 +4,15 @@ import subprocess
 import sys
 from pathlib import Path
 
-from machine import ROOT
+from machine import ROOT, alone
 from pio_offline import environment
 
 
 def run_pio(*arguments: str) -> int:
     pio = str(Path(sys.executable).parent / "pio")
-    return subprocess.run([pio, *arguments], cwd=ROOT, env=environment(), check=False).returncode
+    with alone("pio"):
+        variables = environment("teensy41" if "teensy41" in arguments else "native")
+        return subprocess.run([pio, *arguments], cwd=ROOT, env=variables, check=False).returncode
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ from machine import ROOT, fail, install, say
 
 HOME = ROOT / "build" / "pio"
 UNITY = HOME / "unity"
+KEYS = Path("/usr/share/keyrings/debian-archive-keyring.gpg")
 
 # Versions that satisfy platformio.ini and PlatformIO itself, and still say what they are.
 NATIVE = "1.2.1"
@@ -51,15 +52,17 @@ Default([env.BuildProgram()])
 RUN_SCONS = "from SCons.Script.Main import main\n\nmain()\n"
 
 
-def environment() -> dict[str, str]:
+def environment(target: str = "native") -> dict[str, str]:
     """The variables to run `pio` with, after making sure that what it needs is there."""
     variables = {
         **os.environ,
         "PLATFORMIO_SETTING_ENABLE_TELEMETRY": "no",
         "PLATFORMIO_DISABLE_UPGRADE_CHECK": "true",
     }
-    if installed_from_registry() or registry_answers():
+    if installed_from_registry(target) or registry_answers():
         return variables
+    if target != "native":
+        fail("the Teensy's compiler and core come from PlatformIO's registry: it does not answer")
     core = Path(os.environ.get("PLATFORMIO_CORE_DIR") or HOME / "core").absolute()
     libraries = HOME / "libdeps"
     variables["PLATFORMIO_CORE_DIR"] = str(core)
@@ -71,12 +74,13 @@ def environment() -> dict[str, str]:
     return variables
 
 
-def installed_from_registry() -> bool:
+def installed_from_registry(target: str) -> bool:
     """All is there from an earlier run: no need to ask, and good for a train without network."""
     core = Path(os.environ.get("PLATFORMIO_CORE_DIR") or "~/.platformio").expanduser()
-    places = (core / "platforms/native", core / "packages/tool-scons")
-    libraries = ROOT / ".pio/libdeps/native"  # stand-ins are never put here
-    return all(place.is_dir() for place in (*places, libraries / "Unity"))
+    platform = {"native": "native", "teensy41": "teensy"}[target]
+    libraries = ROOT / ".pio/libdeps" / target  # stand-ins are never put here
+    places = (core / "platforms" / platform, core / "packages/tool-scons", libraries / "Unity")
+    return all(place.is_dir() for place in places)
 
 
 def registry_answers() -> bool:
@@ -156,7 +160,7 @@ def get_unity() -> str:
 def fetch_unity() -> None:
     if not (shutil.which("apt-get") and shutil.which("dpkg-deb")):
         fail("no apt-get here to fetch Unity with: run this once where the registry answers")
-    if not Path("/usr/share/keyrings/debian-archive-keyring.gpg").exists():
+    if not KEYS.exists():
         install(["debian-archive-keyring"])
     work = HOME / "apt"
     for mirror in debian_mirrors():
@@ -172,7 +176,8 @@ def fetch_unity() -> None:
 
 def debian_mirrors() -> list[str]:
     """The addresses this machine's own apt uses for Debian, read from it and never written down."""
-    command = ["apt-get", "indextargets", "--format", "$(CREATED_BY) $(COMPONENT) $(REPO_URI)"]
+    columns = "$(CREATED_BY) $(COMPONENT) $(REPO_URI)"
+    command = ["apt-get", "indextargets", "--no-release-info", "--format", columns]
     listing = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     mirrors = []
     for line in listing.splitlines():
@@ -184,7 +189,7 @@ def debian_mirrors() -> list[str]:
 
 def unity_from_cmock(mirror: str, work: Path) -> tuple[Path, str] | None:
     """The binary package `cmock` of Debian 13 carries Unity 2.5.4."""
-    if not apt(work, f"deb {mirror} trixie main", "download", "cmock"):
+    if not apt(work, f"deb [signed-by={KEYS}] {mirror} trixie main", "download", "cmock"):
         return None
     (package,) = work.glob("cmock_*.deb")
     subprocess.run(["dpkg-deb", "-x", str(package), str(work / "root")], check=True)
@@ -193,7 +198,8 @@ def unity_from_cmock(mirror: str, work: Path) -> tuple[Path, str] | None:
 
 def unity_from_ntpsec(mirror: str, work: Path) -> tuple[Path, str] | None:
     """The source package `ntpsec` of Debian 12 carries Unity 2.5.1 for its own tests."""
-    if not apt(work, f"deb-src {mirror} bookworm main", "source", "--download-only", "ntpsec"):
+    source = f"deb-src [signed-by={KEYS}] {mirror} bookworm main"
+    if not apt(work, source, "source", "--download-only", "ntpsec"):
         return None
     (package,) = work.glob("ntpsec_*.orig.tar.*")
     with tarfile.open(package) as archive:

@@ -13,7 +13,7 @@ import sys
 from dataclasses import asdict, dataclass, field
 from xml.etree import ElementTree
 
-from machine import ROOT
+from machine import ROOT, alone
 from pio import run_pio
 
 REPORTS = ROOT / "build" / "test"
@@ -90,4 +90,5 @@ def run_pytest(tally: Tally) -> None:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    with alone("test"):
+        raise SystemExit(main())

@@ -13,14 +13,13 @@ Standard library only: it runs before anything is installed.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-from machine import ROOT, fail, require_build_tools, say, use_supported_python
+from machine import ROOT, alone, fail, require_build_tools, say, use_supported_python
 
 VENV = ROOT / ".venv"
 STAMP = VENV / "strix-setup.stamp"
@@ -31,9 +30,7 @@ CORE_BUILD = ROOT / "build" / "core"
 
 def main() -> None:
     use_supported_python()
-    (ROOT / "build").mkdir(exist_ok=True)
-    with (ROOT / "build" / "setup.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # two runs at once take turns; freed however we end
+    with alone("setup"):
         set_up_environment()
         if sys.argv[1:] != ["environment"]:
             build_core()

@@ -50,7 +50,9 @@ def fly(
     mission: Annotated[
         str, typer.Option(help="Mission of include/missions/, or a mission file")
     ] = "first-flight",
-    scenario: Annotated[str, typer.Option(help="What surrounds the flight: calm, wind, …")] = "calm",
+    scenario: Annotated[
+        str, typer.Option(help="What surrounds the flight: calm, wind, …")
+    ] = "calm",
     heading: Annotated[float, typer.Option(help="Start heading, deg clockwise from north")] = 0.0,
     seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Of all noise and gusts")] = 1,
     out: Annotated[
@@ -115,6 +117,21 @@ def score(
         library.read_attitude(estimate), library.read_reference(reference), after
     )
     print(json.dumps(result.to_dict()) if as_json else result.table())
+
+
+@app.command(epilog="Example: strix gains --vehicle Quad5in --check")
+@says_what_is_wrong
+def gains(
+    vehicle: Annotated[str | None, typer.Option(help="One airframe; all when left out")] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Write nothing; exit with 1 if a header is out of date")
+    ] = False,
+) -> None:
+    """Design the controller's gains from the vehicle file, into include/gains/."""
+    from strix.gains import run_gains
+
+    if not run_gains(vehicle, check):
+        raise typer.Exit(1)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,9 +67,11 @@ def estimate(
     recording = _undelayed(recording, delays_s or {})
     start = find_still_start(recording)
     imu = recording.imu[np.searchsorted(recording.imu[:, 0], start.begin_s) :]
-    filter_ = ESKF(config or NavigationConfig())
+    config = config or (NavigationConfig() if start.resting else _started_in_motion())
+    gravity = float(np.linalg.norm(start.accel_m_s2)) if start.resting else config.gravity
+    filter_ = ESKF(config)
     alignment = alignStill(_single(start.accel_m_s2), _single(start.mag_ut), declination_rad)
-    filter_.initialize(alignment, float(np.linalg.norm(start.accel_m_s2)))
+    filter_.initialize(alignment, gravity)
 
     now = micros(imu[:, 0])
     accel = _single(imu[:, 1:4])
@@ -112,7 +115,10 @@ def write_estimate(path: Path, result: Estimate) -> None:
             comments="",
         )
     except OSError as error:
-        raise BadInput(f"{path}: expected a file that can be written, found: {error.strerror}") from None
+        raise BadInput(
+            f"{path}: expected a file that can be written, "
+            f"found: {error.strerror}: {error.filename}"
+        ) from None
 
 
 def micros(t_s: Array) -> list[int]:
@@ -129,6 +135,16 @@ def local_ned(places: Array, origin: Array) -> Array:
 def _geo_point(place: Array) -> GeoPoint:
     latitude, longitude, altitude = (int(x) for x in np.rint(place * [1e7, 1e7, 1e3]))
     return GeoPoint(latitude, longitude, altitude)
+
+
+def _started_in_motion() -> NavigationConfig:
+    """The defaults, but unsure of the alignment, which took accelerations for gravity."""
+    config = NavigationConfig()
+    config.positionSigma0 = 5.0
+    config.velocitySigma0 = 5.0
+    config.tiltSigma0 = 0.2
+    config.headingSigma0 = 0.5
+    return config
 
 
 class _Readings:
@@ -148,7 +164,7 @@ class _Readings:
 
 def _undelayed(recording: Recording, delays_s: Mapping[str, float]) -> Recording:
     """The recording with each time stamp moved back to when the sensor measured."""
-    moved = {}
+    moved: dict[str, Any] = {}
     for sensor, delay_s in delays_s.items():
         table: Array = getattr(recording, sensor).copy()
         table[:, 0] -= delay_s

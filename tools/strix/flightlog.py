@@ -104,12 +104,29 @@ def read_flight_log(path: Path) -> FlightLog:
         raise BadInput(f"{path}: expected a ULog file, which begins with 'ULog', found {found!r}")
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # it prints what it thinks of damage
-            ulog = ULog(io.BytesIO(content))
-    except (ULogException, struct.error, LookupError, TypeError, ValueError) as error:
+            ulog = ULog(_Stream(content))
+    except (ULogException, EOFError, struct.error, LookupError, TypeError, ValueError) as error:
         raise BadInput(f"{path}: expected a ULog file, found damage: {error}") from None
     if not _with_time(ulog):
         raise BadInput(f"{path}: expected a log with records, found none")
     return FlightLog(path, ulog)
+
+
+class _Stream(io.BytesIO):
+    """A file that ends pyulog's search: a damaged size can send it back to where it was before.
+
+    While it makes way it seeks less than once a byte. It would go on after a ValueError.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        super().__init__(content)
+        self._seeks_left = len(content)
+
+    def seek(self, offset: int, whence: int = 0, /) -> int:
+        self._seeks_left -= 1
+        if self._seeks_left < 0:
+            raise EOFError("its parts do not fit together")
+        return super().seek(offset, whence)
 
 
 def _with_time(ulog: ULog) -> list[ULog.Data]:

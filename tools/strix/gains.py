@@ -8,7 +8,7 @@ here with both, and a design that keeps too little is refused.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -122,9 +122,9 @@ def analyse(design: Design) -> list[ChannelReport]:
     return [_analyse_channel(design, channel) for channel in CHANNELS]
 
 
-def refuse_thin_margins(design: Design) -> None:
+def refuse_thin_margins(design: Design, reports: Sequence[ChannelReport]) -> None:
     """Raise BadInput unless every channel keeps 45 deg and 6 dB with motor lag and delay."""
-    for r in analyse(design):
+    for r in reports:
         if r.phase_margin_deg < LEAST_PHASE_MARGIN_DEG or r.gain_margin_db < LEAST_GAIN_MARGIN_DB:
             raise BadInput(
                 f"include/vehicles/{design.name}.h, bryson: expected weights that leave "
@@ -167,12 +167,14 @@ def step_response(
 ) -> tuple[Matrix, Matrix]:
     """Output and control, sampled at the control rate, after a unit step of the reference."""
     F, G = sampled_loop(design, channel)
-    z = np.zeros(len(F))
-    samples = np.empty((round(duration_s * RATE_HZ), len(F)))
-    for k in range(len(samples)):
-        samples[k] = z
-        z = F @ z + G[:, 0]
-    return samples[:, 0], samples[:, -1]
+    n = len(F)
+    M = np.block([[F, G], [np.zeros((1, n)), np.ones((1, 1))]])  # the reference, 1, as a state
+    samples = np.eye(n + 1)[:, -1:]
+    while samples.shape[1] < duration_s * RATE_HZ:  # M holds as many steps as there are samples
+        samples = np.hstack([samples, M @ samples])
+        M = M @ M
+    samples = samples[:, : round(duration_s * RATE_HZ)]
+    return samples[0], samples[n - 1]
 
 
 def _analyse_channel(design: Design, channel: Channel) -> ChannelReport:
@@ -184,7 +186,7 @@ def _analyse_channel(design: Design, channel: Channel) -> ChannelReport:
     Ad, Bd = discretise(A, b[:, None])
     poles = np.log(np.linalg.eigvals(Ad - Bd @ K[None, :]).astype(complex)) / PERIOD_S
 
-    w = np.geomspace(1e-2, np.pi * RATE_HZ, 20_000)
+    w = np.geomspace(1e-2, np.pi * RATE_HZ, 4_000)
     s = 1j * w
     lag = np.exp(-s * DELAY_SAMPLES * PERIOD_S) / (design.motor_time_constant_s * s + 1.0)
     x = np.linalg.solve(s[:, None, None] * np.eye(len(states)) - A, b[:, None])[:, :, 0]
@@ -231,8 +233,8 @@ def _margins(w: Matrix, loop: NDArray[np.complex128]) -> tuple[float, float, flo
 
 
 def gain_text(gain: float) -> str:
-    """Seven digits: float32 has no more, and the eleventh may differ between BLAS libraries."""
-    text = f"{gain + 0.0:.7g}"
+    """Six digits: plenty for a gain, and the same with every BLAS, which differ in the eleventh."""
+    text = f"{gain + 0.0:.6g}"
     return text if "." in text or "e" in text else text + ".0"
 
 
@@ -247,6 +249,7 @@ def render_header(design: Design) -> str:
         "",
         "namespace strix {",
         "",
+        "// clang-format off",
         f"constexpr Gains k{design.name}Gains{{",
         f'    "{design.name} LQR {RATE_HZ} Hz",',
         "    {{",
@@ -260,11 +263,11 @@ def render_header(design: Design) -> str:
             closing = "}," if group == 3 else ","
             text = ", ".join(gain_text(k) + "F" for k in three)
             lines.append(f"        {opening}{text}{closing}  // {column}")
-    lines += ["    }},", "};", "", "}  // namespace strix", ""]
+    lines += ["    }},", "};", "// clang-format on", "", "}  // namespace strix", ""]
     return "\n".join(lines)
 
 
-def render_report(design: Design) -> str:
+def render_report(design: Design, reports: Sequence[ChannelReport]) -> str:
     """The table a person reads before believing a gain."""
     lines = [
         f"{design.name}: LQR at {RATE_HZ} Hz; margins and steps with motor lag "
@@ -273,7 +276,7 @@ def render_report(design: Design) -> str:
         "design poles",
         "         deg     dB      rad/s      rad/s      s         %          per unit   rad/s",
     ]
-    for r in analyse(design):
+    for r in reports:
         poles = "  ".join(_pole_text(p) for p in r.poles_rad_s if p.imag > -1e-6)
         lines.append(
             f"{r.name:<9}{r.phase_margin_deg:<8.1f}{r.gain_margin_db:<8.1f}"
@@ -299,15 +302,16 @@ def run_gains(vehicle: str | None, check: bool, folder: Path = GAINS_FOLDER) -> 
     current = True
     for name in names:
         design = design_gains(_core.vehicle(name))
-        print(render_report(design), end="\n\n")
-        refuse_thin_margins(design)
+        reports = analyse(design)
+        print(render_report(design, reports), end="\n\n")
+        refuse_thin_margins(design, reports)
         current = _put_header(folder / f"{name}.h", render_header(design), check) and current
     return current
 
 
 def _put_header(file: Path, text: str, check: bool) -> bool:
     try:
-        same = file.exists() and file.read_text(encoding="utf-8") == text
+        same = file.exists() and file.read_bytes() == text.encode()
         if check:
             print(f"{file}: {'as designed' if same else 'not what the vehicle file gives'}")
             return same

@@ -92,8 +92,6 @@ def _numbers(place: str, words: list[str], names: tuple[str, ...]) -> tuple[floa
         if not math.isfinite(number):
             raise BadInput(f"{place}, {name}: expected a number, found '{word}'")
         if name == "HOLD_S" and not 0.0 <= number <= _LONGEST_HOLD_S:
-            raise BadInput(
-                f"{place}, {name}: expected 0 to {_LONGEST_HOLD_S:g} s, found '{word}'"
-            )
+            raise BadInput(f"{place}, {name}: expected 0 to {_LONGEST_HOLD_S:g} s, found '{word}'")
         numbers.append(number)
     return tuple(numbers)

@@ -38,6 +38,8 @@ FIX, PLACE, VELOCITY = 1, slice(2, 5), slice(5, 8)  # columns of gps
 FIX_3D = 3.0
 LIMITS = {TIME: MAX_TIME_S, "lat_deg": 90.0, "lon_deg": 180.0, "alt_m": 100_000.0}
 
+END_OF_FILE = "the end of the file"
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -69,7 +71,9 @@ def read_recording(folder: Path) -> Recording:
 
 def find_table(folder: Path, name: str) -> Path | None:
     """NAME.csv or NAME.csv.gz in the folder; None when there is neither."""
-    return next((p for p in (folder / f"{name}.csv", folder / f"{name}.csv.gz") if p.exists()), None)
+    return next(
+        (p for p in (folder / f"{name}.csv", folder / f"{name}.csv.gz") if p.exists()), None
+    )
 
 
 def read_table(path: Path, columns: tuple[str, ...], may_be_nan: tuple[str, ...] = ()) -> Array:
@@ -80,7 +84,9 @@ def read_table(path: Path, columns: tuple[str, ...], may_be_nan: tuple[str, ...]
     """
     lines = _read_lines(path)
     if not lines:
-        raise BadInput(f"{path}: expected a line with the columns {','.join(columns)}, found an empty file")
+        raise BadInput(
+            f"{path}: expected a line with the columns {','.join(columns)}, found an empty file"
+        )
     header = [name.strip() for name in lines[0].split(",")]
     for name in columns:
         if name not in header:
@@ -114,34 +120,34 @@ def _read_lines(path: Path) -> list[str]:
     """Lines of the file without their ends. A last line without an end is a file cut in a row:
     its last number may have lost digits and still be a number.
     """
+    content, end = _read_bytes(path)
+    lines = content.decode("utf-8-sig", errors="replace").split("\n")
+    last = lines.pop()
+    if last or end != END_OF_FILE:
+        header = (lines or [last])[0].split(",")
+        column = header[min(last.count(","), len(header) - 1)]
+        raise BadInput(
+            f"{path}: line {len(lines) + 1}, column {column.strip()}: "
+            f"expected the rest of the row and a line end, found {end}"
+        )
+    return [line.removesuffix("\r") for line in lines]
+
+
+def _read_bytes(path: Path) -> tuple[bytes, str]:
+    """Content of the file, as far as it can be had, and what ends it."""
     content = bytearray()
-    cut = "the end of the file"
+    end = END_OF_FILE
     try:
         with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
-            try:
-                while chunk := file.read(1 << 20):
-                    content += chunk
-            except EOFError:
-                cut = "the end of the compressed data (the file is cut)"
-            except (gzip.BadGzipFile, zlib.error) as error:
-                cut = f"damaged compressed data ({error})"
-                if not content:
-                    raise BadInput(f"{path}: expected a gzip file, found {cut}") from None
+            while chunk := file.read(1 << 16):
+                content += chunk
+    except EOFError:
+        end = "the end of the compressed data (the file is cut)"
+    except (gzip.BadGzipFile, zlib.error) as error:
+        end = f"damaged gzip data ({error})"
     except OSError as error:
         raise BadInput(f"{path}: expected a readable file, found: {error.strerror}") from None
-    text = content.decode("utf-8-sig", errors="replace")
-    lines = text.split("\n")
-    last = lines.pop()
-    if last or cut != "the end of the file":
-        if text:
-            header = [name.strip() for name in lines[0].split(",")] if lines else []
-            column = header[min(last.count(","), len(header) - 1)] if header else "of the header"
-            raise BadInput(
-                f"{path}: line {len(lines) + 1}, column {column}: "
-                f"expected the rest of the row and a line end, found {cut}"
-            )
-        raise BadInput(f"{path}: line 1: expected a line with column names, found {cut}")
-    return [line.removesuffix("\r") for line in lines]
+    return bytes(content), end
 
 
 def _refuse_text(path: Path, number: int, columns: tuple[str, ...], fields: list[str]) -> None:
@@ -164,14 +170,12 @@ def _check_values(
     if not good.all():
         row, column = (int(i) for i in np.argwhere(~good)[0])
         value = float(table[row, column])
-        expected = (
-            f"a number from {-limits[column]:g} to {limits[column]:g}"
-            if math.isfinite(value)
-            else "a finite number"
-        )
-        raise BadInput(
-            f"{path}: line {row + 2}, column {columns[column]}: expected {expected}, found {value:g}"
-        )
+        limit = limits[column]
+        expected = f"a number from {-limit:g} to {limit:g}"
+        if not math.isfinite(value):
+            expected = "a finite number"
+        place = f"{path}: line {row + 2}, column {columns[column]}"
+        raise BadInput(f"{place}: expected {expected}, found {value:g}")
     backwards = np.flatnonzero(np.diff(table[:, 0]) < 0.0)
     if backwards.size:
         row = int(backwards[0]) + 1

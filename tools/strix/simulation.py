@@ -10,6 +10,7 @@ from pathlib import Path
 from strix import _core
 from strix.missions import Mission
 from strix.plant.earth import MAGNETIC_DECLINATION_RAD
+from strix.plant.frames import Matrix
 from strix.plant.plant import Plant
 from strix.plant.scenario import Scenario
 from strix.plant.sensors import DEFAULT_CONSTANTS, Samples, SensorConstants, SensorSuite
@@ -23,6 +24,10 @@ START_AFTER_S = 2.0  # from arming to take-off
 RETRY_S = 2.0  # arming was refused: switch off, and on again after this long
 AFTER_LANDING_S = 2.0
 GIVE_UP_S = 180.0
+
+# How the simulated magnetometer is built in; include/FlightConfig.h must undo it. The rows are its
+# axes in the body: forward, left, down. Left-handed, as the LIS2MDL's are.
+MAG_MOUNTING: Matrix = ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
 
 Progress = Callable[[float, str], None]  # time s, state name
 
@@ -74,7 +79,7 @@ def fly(
     plant = Plant(
         plant_numbers(plan.vehicle), plan.scenario, math.radians(plan.heading_deg), plan.seed
     )
-    sensors = SensorSuite(plan.scenario, plan.seed, plan.sensors)
+    sensors = SensorSuite(plan.scenario, plan.seed, plan.sensors, MAG_MOUNTING)
     flight = _core.Flight(
         vehicle=plan.vehicle,
         mission=mission.name,

@@ -27,6 +27,7 @@ class StillStart:
     mag_ut: Array  # zeros without a magnetometer
     alt_m: float  # zero without a barometer
     place: Array  # latitude and longitude in deg, altitude in m; zeros without GPS
+    resting: bool
     note: str  # empty, or why this window
 
 
@@ -42,9 +43,10 @@ def find_still_start(recording: Recording) -> StillStart:
         begins = np.append(np.arange(begin, last, 0.25 * WINDOW_S), begin)
         begin = min(begins, key=lambda t: _unrest(_window(imu, t)))
         note = f"not at rest at the start: aligned at {begin:.1f} to {begin + WINDOW_S:.1f} s"
-        if not _rests(_window(imu, begin)):
-            note += ", the stillest there is, without a gyro bias"
     rest = _window(imu, begin)
+    resting = _rests(rest)
+    if not resting:
+        note += ", the stillest there is: expect errors of some degrees"
     fixes = recording.gps[recording.gps[:, FIX] >= FIX_3D]
     field = _mean_or_first(recording.mag, begin)
     height = _mean_or_first(recording.baro, begin)
@@ -53,10 +55,11 @@ def find_still_start(recording: Recording) -> StillStart:
         begin_s=float(begin),
         end_s=float(rest[-1, 0]),
         accel_m_s2=rest[:, 1:4].mean(axis=0),
-        gyro_bias_rad_s=rest[:, 4:7].mean(axis=0) if _rests(rest) else np.zeros(3),
+        gyro_bias_rad_s=rest[:, 4:7].mean(axis=0) if resting else np.zeros(3),
         mag_ut=field[1:4],
         alt_m=float(height[1]),
         place=place[PLACE],
+        resting=resting,
         note=note,
     )
 
@@ -71,7 +74,7 @@ def _mean_or_first(table: Array, begin_s: float) -> Array:
     if not len(table):
         return np.zeros(table.shape[1])
     if table[-1, 0] < begin_s:
-        return table[-1]
+        return np.asarray(table[-1])
     return np.asarray(_window(table, begin_s).mean(axis=0))
 
 

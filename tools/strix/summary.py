@@ -135,14 +135,14 @@ def verdict(summary: Summary) -> str:
     return f"Did not land; {motors} at the end"
 
 
-def shown(row: Row, summary: Summary) -> str:
-    """The number as text, without its unit."""
+def shown(row: Row, summary: Summary) -> tuple[str, str]:
+    """The number and its unit as texts."""
     value = getattr(summary, row.key)
     if value is None:
-        return "-"
+        return "-", ""
     if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.{row.digits}f}"
+        return "yes" if value else "no", ""
+    return f"{value:.{row.digits}f}", row.unit
 
 
 def rating(row: Row, summary: Summary) -> str:
@@ -162,6 +162,7 @@ def print_summary(summary: Summary, console: Console | None = None) -> None:
     table.add_column(no_wrap=True)
     table.add_column(style="dim")
     for row in ROWS:
-        value = Text(shown(row, summary), style=styles[rating(row, summary)])
-        table.add_row(row.name, value, row.unit, row.meaning)
+        value, unit = shown(row, summary)
+        style = styles[rating(row, summary)]
+        table.add_row(row.name, Text(value, style), unit, row.meaning)
     (console or Console()).print(table)

@@ -119,7 +119,7 @@ def truth_track(rate_hz: float = 200.0) -> TruthTrack:
 
 
 def write_flight(path: Path) -> SyntheticFlight:
-    """The whole flight, every topic at its rate on the aircraft."""
+    """The whole flight, every topic of estimate and control at its rate on the aircraft."""
     rng = np.random.default_rng(1)
     truth = truth_track()
     log = ULogWriter()
@@ -226,8 +226,6 @@ def write_flight(path: Path) -> SyntheticFlight:
     t2 = times(2.0)
     log.topic("log_status", t2, {"bytes": 250e3 * t2, "longest_stall_us": 7000})
 
-    imu = times(1000.0)
-    log.topic("sensor_combined", imu, {"accelerometer_m_s2": [0.0, 0.0, -9.81]})
     for begin, state, _ in LEGS[1:]:
         log.text(begin, 6, SAID[state] if begin < 58.0 else "landed: disarmed")
     return SyntheticFlight(log.write(path), truth)

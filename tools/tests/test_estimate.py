@@ -83,7 +83,7 @@ def test_every_sensor_but_the_imu_may_be_missing(tmp_path: Path) -> None:
     assert scored(with_mag, CASE).total_deg < 3.0
     alone = run(tmp_path / "imu", CASE, ("imu",))
     assert np.isfinite(alone.table).all()
-    assert scored(alone, CASE).inclination_deg < 2.0
+    assert scored(alone, CASE).inclination_deg < 3.0  # nothing knows the accelerations
     assert abs(alone.table[0, 4]) < 1e-3  # no field, no heading: it starts at 0
 
 
@@ -97,12 +97,14 @@ def test_the_loop_clock_may_wrap_within_a_recording(tmp_path: Path) -> None:
 
 
 def test_a_start_in_motion_is_told(tmp_path: Path) -> None:
-    case = replace(CASE, moving_at_start=True)
+    case = replace(CASE, moving_at_start=True, gyro_bias_rad_s=(0.001, -0.001, 0.0))
     result = run(tmp_path, case)
     assert result.start.note.startswith("not at rest at the start")
     assert result.table[0, 0] == result.start.begin_s
-    assert np.isfinite(result.table).all()
-    assert scored(result, case, after_s=20.0).inclination_deg < 4.0
+    found = scored(result, case, after_s=20.0)
+    # The field's dip was measured with a tilted level, and stays the reference.
+    assert found.inclination_deg < 6.0
+    assert found.heading_deg < 4.0
 
 
 @pytest.mark.parametrize("rows", [1, 2, 30])

@@ -77,7 +77,7 @@ def test_a_missing_file_is_refused_in_one_line(tmp_path: Path) -> None:
 def test_another_kind_of_file_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "other.ulg"
     path.write_bytes(content)
-    assert "expected a ULog file" in refusal(path)
+    assert "expected a ULog file, which begins with 'ULog', found" in refusal(path)
 
 
 def test_a_log_without_records_is_refused_in_one_line(tmp_path: Path) -> None:

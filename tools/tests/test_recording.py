@@ -71,7 +71,11 @@ def test_columns_are_found_by_name_and_others_passed_over(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("name", "change", "words"),
     [
-        ("mag.csv", lambda s: ["t_s,mx_uT,mz_uT", *s[1:]], ["line 1", "column my_uT", "'t_s,mx_uT"]),
+        (
+            "mag.csv",
+            lambda s: ["t_s,mx_uT,mz_uT", *s[1:]],
+            ["line 1", "column my_uT", "'t_s,mx_uT"],
+        ),
         ("imu.csv.gz", replaced(7, 3, "nan"), ["line 7", "column az", "finite", "nan"]),
         ("imu.csv.gz", replaced(8, 6, "inf"), ["line 8", "column gz", "finite", "inf"]),
         ("mag.csv", replaced(3, 2, "x9"), ["line 3", "column my_uT", "a number", "'x9'"]),
@@ -120,7 +124,7 @@ def test_damaged_and_mislabelled_gzip_files_are_refused(folder: Path) -> None:
     path.write_bytes(good)
     assert str(path) in said(folder)
     path.write_text("t_s,ax,ay,az,gx,gy,gz\n")
-    assert "expected a gzip file" in said(folder)
+    assert "found damaged gzip data" in said(folder)
 
 
 def test_bytes_that_are_no_text_are_refused(folder: Path) -> None:

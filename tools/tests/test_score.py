@@ -52,7 +52,7 @@ def test_a_turn_about_the_body_x_axis_is_roll_and_inclination(yaw_deg: float) ->
 
 def test_heading_and_inclination_are_the_parts_of_the_earth_frame_error() -> None:
     error = multiply(turn(2, 40.0), turn(0, 25.0))
-    w, x, y, z = error[0]
+    w, _, _, z = error[0]
     found = score(table(error), reference(turn(0, 0.0)))
     assert found.total_deg == pytest.approx(np.degrees(2 * np.arccos(abs(w))))
     assert found.heading_deg == pytest.approx(np.degrees(2 * np.arctan(abs(z / w))))
@@ -107,5 +107,5 @@ def test_files_are_read_and_their_quaternions_checked(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="line 2, column qw: expected a finite number"):
         read_attitude(path)
     path.write_text("t_s,qw,qx,qy,qz,scored\n0,1,0,0,0,1\n1,0,0,0,0,1\n")
-    with pytest.raises(BadInput, match="line 3.*length 1, found length 0"):
+    with pytest.raises(BadInput, match=r"line 3.*length 1, found length 0"):
         read_reference(path)

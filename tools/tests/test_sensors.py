@@ -63,6 +63,7 @@ def test_each_sensor_keeps_its_rate_and_no_two_slow_ones_start_together() -> Non
     for name, (period_ms, phase_ms) in expected.items():
         assert set(np.diff(times[name])) == {period_ms}
         assert times[name][0] % period_ms == phase_ms
+        assert times[name][-1] + period_ms >= 3000  # to the end
     # Nothing is delivered that was measured before there was anything to measure.
     assert (times["mag"][0], times["baro"][0], times["gps"][0]) == (13, 27, 141)
 
@@ -178,6 +179,7 @@ def test_imu_biases_have_their_size_over_many_starts() -> None:
     low, high = chi2.ppf(RARE, bias.shape[0])
     for axis_sum in (bias**2).sum(axis=0):
         assert low < axis_sum < high
+    assert np.abs(bias.mean(axis=0)).max() < 5.0 / math.sqrt(bias.shape[0])
 
 
 def test_accelerometer_bias_stays_and_gyro_bias_walks() -> None:

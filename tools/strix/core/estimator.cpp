@@ -28,7 +28,8 @@ void bindConfig(nb::module_& m) {
       .def_rw("density", &MeasurementNoise::density)
       .def("variance", &MeasurementNoise::variance, "dt"_a);
 
-  nb::class_<NavigationConfig>(m, "NavigationConfig", "Tuning of the filter; starts as the defaults")
+  nb::class_<NavigationConfig>(m, "NavigationConfig",
+                               "Tuning of the filter; starts as the defaults")
       .def(nb::init<>())
       .def_rw("gravity", &NavigationConfig::gravity)
       .def_rw("accelNoise", &NavigationConfig::accelNoise)
@@ -39,6 +40,7 @@ void bindConfig(nb::module_& m) {
       .def_rw("alt", &NavigationConfig::alt)
       .def_rw("gpsPositionSigma", &NavigationConfig::gpsPositionSigma)
       .def_rw("gpsVelocitySigma", &NavigationConfig::gpsVelocitySigma)
+      .def_rw("standstillSigma", &NavigationConfig::standstillSigma)
       .def_rw("gpsDelay", &NavigationConfig::gpsDelay)
       .def_rw("nisGate", &NavigationConfig::nisGate)
       .def_rw("positionSigma0", &NavigationConfig::positionSigma0)
@@ -81,6 +83,7 @@ void bindFilter(nb::module_& m) {
       .def("updateMagMeas", &ESKF::updateMagMeas, "mag"_a, "now"_a)
       .def("updateAltMeas", &ESKF::updateAltMeas, "height"_a, "now"_a)
       .def("updateGPSMeas", &ESKF::updateGPSMeas, "positionNed"_a, "velocityNed"_a)
+      .def("updateStandstill", &ESKF::updateStandstill)
       .def("injectError", &ESKF::injectError)
       .def("healthy", &ESKF::healthy)
       .def("covariance", [](const ESKF& f) { return f.covariance(); })

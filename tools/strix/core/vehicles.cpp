@@ -5,6 +5,7 @@
 #include <Controller.h>
 #include <States.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
 #include "missions/FirstFlight.h"
 #include "vehicles/Vehicles.h"
@@ -62,15 +63,19 @@ nb::dict toDict(const strix::Vehicle& v) {
   return d;
 }
 
-nb::dict vehicle(const std::string& name) {
+using Dict = nb::typed<nb::dict, nb::str, nb::any>;
+
+Dict vehicle(const std::string& name) {
   const strix::Airframe* airframe = strix::findAirframe(name);
   if (airframe == nullptr) throw nb::key_error(name.c_str());
-  return toDict(airframe->vehicle);
+  return Dict(toDict(airframe->vehicle));
 }
 
-nb::list vehicleNames() {
-  nb::list names;
-  for (const strix::Airframe& airframe : strix::kAirframes) names.append(airframe.vehicle.name);
+std::vector<std::string> vehicleNames() {
+  std::vector<std::string> names;
+  for (const strix::Airframe& airframe : strix::kAirframes) {
+    names.emplace_back(airframe.vehicle.name);
+  }
   return names;
 }
 
@@ -89,15 +94,11 @@ nb::dict mission(const strix::Mission& m) {
   return d;
 }
 
-nb::list missions() {
-  nb::list all;
-  all.append(mission(strix::kFirstFlight));
-  return all;
-}
+std::vector<Dict> missions() { return {Dict(mission(strix::kFirstFlight))}; }
 
-nb::list stateNames() {
-  nb::list names;
-  for (const strix::StateProperties& state : strix::kStates) names.append(state.name);
+std::vector<std::string> stateNames() {
+  std::vector<std::string> names;
+  for (const strix::StateProperties& state : strix::kStates) names.emplace_back(state.name);
   return names;
 }
 

@@ -26,7 +26,7 @@ BAND = "rgba(43,127,224,0.16)"
 ALARM = "#e5383b"
 FAINT = "rgba(128,128,128,0.4)"
 FOUR = ("#2b7fe0", "#e8790c", "#17a06b", "#b455d6")  # M1..M4, or components
-STATES = ("#98a1ad", "#6b7f99", "#d6a100", "#17a06b", "#2b7fe0", "#8a5cf0", "#e8790c", "#e5383b")
+STATES = ("#98a1ad", "#6b7f99", "#d6a100", "#17a06b", "#2b7fe0", "#8a5cf0", "#e8790c")
 
 LINE_POINTS = 2000  # of one line at most: more than a screen is wide
 
@@ -176,7 +176,7 @@ def dots(name: str, x: Array, y: Array, color: str) -> Trace:
         "name": name,
         "x": encoded(x),
         "y": encoded(y),
-        "marker": {"color": color, "size": 4, "opacity": 0.55},
+        "marker": {"color": color, "size": 4, "opacity": 0.7},
     }
 
 

@@ -77,16 +77,13 @@ def _commands(flight: Comparison, limits: EscLimits | None, time: TimeAxis) -> C
 
 def _wrench(flight: Comparison, time: TimeAxis) -> Chart:
     asked, given = flight.log.topic("wrench_setpoint"), flight.log.topic("wrench_achieved")
-    curves = [
-        (name, topic.time_s, _controlled(flight, topic), color)
-        for name, topic, color in (("asked", asked, REFERENCE), ("given", given, ESTIMATE))
-    ]
+    asked_for, given_back = _controlled(flight, asked), _controlled(flight, given)
     rows = [
         Panel(
             title,
             [
-                line(name, at_s, wrench[:, column], color, 1.2)
-                for name, at_s, wrench, color in curves
+                line("asked", asked.time_s, asked_for[:, column], REFERENCE, 4),
+                line("given", given.time_s, given_back[:, column], ESTIMATE, 1.2),
             ],
         )
         for column, title in enumerate(("thrust, N", "roll, N m", "pitch, N m", "yaw, N m"))
@@ -150,7 +147,7 @@ def _rejected(refusals: Sequence[tuple[float, float, str]]) -> Trace:
     time_s, nis, _ = (np.array(column) for column in zip(*refusals, strict=True))
     return {
         **dots("rejected", time_s, np.minimum(nis, NIS_TOP), ALARM),
-        "marker": {"color": ALARM, "size": 7, "symbol": "x"},
+        "marker": {"color": ALARM, "size": 5, "symbol": "x"},
         "text": [f"{component}, NIS {value:.1f}" for _, value, component in refusals],
         "hovertemplate": "%{text}",
     }
@@ -161,8 +158,8 @@ def software(flight: Comparison, time: TimeAxis) -> list[Chart]:
     tick, status = flight.log.topic("control_tick"), flight.log.topic("log_status")
     period_us = np.diff(tick.time_s, prepend=np.nan) * 1e6
     loop = [
-        Panel("one pass, µs", [line("pass", tick.time_s, tick["pass_us"], ESTIMATE, 1.2)]),
-        Panel("control period, µs", [line("period", tick.time_s, period_us, REFERENCE, 1.2)]),
+        Panel("pass, µs", [line("pass", tick.time_s, tick["pass_us"], ESTIMATE, 1.2)]),
+        Panel("period, µs", [line("period", tick.time_s, period_us, REFERENCE, 1.2)]),
     ]
     seconds = np.diff(status.time_s)
     rate = np.diff(status["bytes"]) / np.where(seconds > 0.0, seconds, np.nan) / 1000.0

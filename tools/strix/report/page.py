@@ -23,6 +23,7 @@ from strix.track import TruthTrack
 
 # What the log says of itself, and the word before it.
 INFO = {"vehicle": "", "ver_hw": "", "ver_sw": "version ", "ver_sw_git": "commit "}
+ONLY_SIMULATED = ("wall_s", "rms_attitude_deg", "rms_position_m")
 LEVEL_STYLES = {
     "emergency": "bad",
     "alert": "bad",
@@ -109,7 +110,7 @@ def _sections(flight: Comparison) -> list[Section]:
         Section(
             "motors",
             "Motors",
-            "M1 to M4 as in the vehicle's drawing. Where 'given' leaves 'asked', the motors could "
+            "M1 to M4 as in the vehicle's file. Where 'given' leaves 'asked', the motors could "
             "not do what the controller wanted.",
             machine_charts.motors(flight, esc_limits(flight.log), time),
         ),
@@ -118,7 +119,8 @@ def _sections(flight: Comparison) -> list[Section]:
             "Measurements against expectation",
             "NIS (normalised innovation squared) is the square of measured minus expected, divided "
             "by the variance that the filter expects of it. An honest filter has a mean of 1 and "
-            f"99 % below {machine_charts.NIS_GATE}; what is above is rejected. Higher values are "
+            f"99 % below {machine_charts.NIS_GATE}; a mean far below 1 says that it trusts the "
+            "sensor less than it could. What is above the bound is rejected. Very high values are "
             "drawn at the upper edge; of many dots only a part is drawn, evenly chosen.",
             machine_charts.innovations(flight, time),
         ),
@@ -145,9 +147,9 @@ def _head(flight: Comparison, summary: Summary) -> str:
         parts.append('<p class="warn">The log is damaged or cut: what is missing is not shown.</p>')
     parts.append('<dl class="tiles">')
     for row in ROWS:
-        if row.key == "wall_s" and flight.truth is None:
+        if flight.truth is None and row.key in ONLY_SIMULATED:
             continue
-        value = escape(f"{shown(row, summary)} {row.unit}".strip())
+        value = escape(" ".join(shown(row, summary)))
         parts.append(
             f'<div><dt>{row.name}</dt><dd><span class="value {rating(row, summary)}">{value}</span>'
             f'<br><span class="meaning">{escape(row.meaning)}</span></dd></div>'

@@ -1,0 +1,8 @@
+/// The parts of this suite; test_flight_software.cpp runs them.
+#pragma once
+
+void runArmingTests();
+void runMotorsOffTests();
+void runLoopTests();
+void runBadInputTests();
+void runHeapTests();

@@ -1,0 +1,17 @@
+#include <unity.h>
+
+#include "suites.h"
+
+void setUp() {}
+void tearDown() {}
+
+int main() {
+  UNITY_BEGIN();
+  runArmingTests();
+  runMotorsOffTests();
+  runLoopTests();
+  runBadInputTests();
+  runHeapTests();
+  UNITY_END();
+  return 0;
+}
