@@ -98,6 +98,8 @@ def estimate(
 
     delays_s = library.parse_delays(delay)
     result = library.estimate(read_recording(recording), math.radians(declination), delays_s)
+    if result.start.note:
+        print(f"strix: {result.start.note}", file=sys.stderr)
     library.write_estimate(out, result)
     print(f"{len(result.table)} rows written to {out}")
 
