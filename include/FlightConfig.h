@@ -2,11 +2,13 @@
 #pragma once
 
 #include "FlightSoftwareConfig.h"
-#include "gains/Quad5in.h"
 #include "missions/FirstFlight.h"
-#include "vehicles/Quad5in.h"
+#include "vehicles/Vehicles.h"
 
 namespace strix {
+
+/// The airframe src/main.cpp flies.
+constexpr Airframe kFlown{kQuad5in, kQuad5inGains};
 
 /// Magnetic declination where you fly, east positive: look it up for your field.
 constexpr float kDeclination = 4.0F * kDegToRad;
@@ -16,10 +18,9 @@ constexpr float kDeclination = 4.0F * kDegToRad;
 constexpr Micros kGpsDelay = 100'000;
 
 /// How the LIS2MDL sits in the body: its x and z axes as the body's, its y axis to the left. As its
-/// axes are left-handed this is a reflection, whatever the mounting; another mounting moves the sign.
-[[nodiscard]] inline Matrix3f magSensorToBody() {
-  return Vector3f{1.0F, -1.0F, 1.0F}.asDiagonal();
-}
+/// axes are left-handed this is a reflection, whatever the mounting; another mounting moves the
+/// sign.
+[[nodiscard]] inline Matrix3f magSensorToBody() { return Vector3f{1.0F, -1.0F, 1.0F}.asDiagonal(); }
 
 /// Configuration of one airframe with the defaults of every library.
 [[nodiscard]] inline FlightSoftwareConfig flightConfig(const Vehicle& vehicle, const Gains& gains,
@@ -33,7 +34,7 @@ constexpr Micros kGpsDelay = 100'000;
 
 /// What src/main.cpp flies.
 [[nodiscard]] inline FlightSoftwareConfig flightConfig() {
-  return flightConfig(kQuad5in, kQuad5inGains, kFirstFlight, kDeclination);
+  return flightConfig(kFlown.vehicle, kFlown.gains, kFirstFlight, kDeclination);
 }
 
 }  // namespace strix

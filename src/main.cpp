@@ -2,11 +2,15 @@
 #include <cstddef>
 #include <cstring>
 #include <new>
+#include <string_view>
 
 #include "FlightConfig.h"
 #include "FlightSoftware.h"
 
 #include "board/TeensyBoard.h"
+
+// The board's ESCs are driven by pulse width; an airframe with other ESCs needs another EscPwm.
+static_assert(std::string_view(strix::kFlown.vehicle.commandUnit) == "us");
 
 namespace {
 

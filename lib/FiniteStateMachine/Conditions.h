@@ -12,33 +12,32 @@ using ConditionSet = std::uint32_t;
 
 namespace condition {
 constexpr ConditionSet kNone = 0;
-constexpr ConditionSet kCalibrated = 1U << 0U;          ///< start-up calibration is done
-constexpr ConditionSet kArmEdge = 1U << 1U;             ///< arm switch went from off to on
-constexpr ConditionSet kDisarm = 1U << 2U;              ///< arm switch is off
-constexpr ConditionSet kPreArmFailure = 1U << 3U;       ///< any pre-arm check fails
-constexpr ConditionSet kStart = 1U << 4U;               ///< start switch is on
-constexpr ConditionSet kArmedTooLong = 1U << 5U;        ///< armed and nothing happened
-constexpr ConditionSet kArrived = 1U << 6U;             ///< at the target of this leg
-constexpr ConditionSet kHoldDone = 1U << 7U;            ///< held there as long as asked
-constexpr ConditionSet kLegsRemain = 1U << 8U;          ///< the mission has another leg
-constexpr ConditionSet kTouchDown = 1U << 9U;           ///< on the ground again
-constexpr ConditionSet kKill = 1U << 10U;               ///< kill switch is on
-constexpr ConditionSet kUpset = 1U << 11U;              ///< tilt past 90 deg
-constexpr ConditionSet kOutsideFence = 1U << 12U;       ///< too far or too high
-constexpr ConditionSet kImuLost = 1U << 13U;            ///< no IMU sample in time
-constexpr ConditionSet kEstimatorUnhealthy = 1U << 14U; ///< state or covariance not usable
+constexpr ConditionSet kCalibrated = 1U << 0U;           ///< start-up calibration is done
+constexpr ConditionSet kArmEdge = 1U << 1U;              ///< arm switch went from off to on
+constexpr ConditionSet kDisarm = 1U << 2U;               ///< arm switch is off
+constexpr ConditionSet kPreArmFailure = 1U << 3U;        ///< any pre-arm check fails
+constexpr ConditionSet kStart = 1U << 4U;                ///< start switch is on
+constexpr ConditionSet kArmedTooLong = 1U << 5U;         ///< armed and nothing happened
+constexpr ConditionSet kArrived = 1U << 6U;              ///< at the target of this leg
+constexpr ConditionSet kHoldDone = 1U << 7U;             ///< held there as long as asked
+constexpr ConditionSet kLegsRemain = 1U << 8U;           ///< the mission has another leg
+constexpr ConditionSet kTouchDown = 1U << 9U;            ///< on the ground again
+constexpr ConditionSet kKill = 1U << 10U;                ///< kill switch is on
+constexpr ConditionSet kUpset = 1U << 11U;               ///< tilt past 90 deg
+constexpr ConditionSet kOutsideFence = 1U << 12U;        ///< too far or too high
+constexpr ConditionSet kImuLost = 1U << 13U;             ///< no IMU sample in time
+constexpr ConditionSet kEstimatorUnhealthy = 1U << 14U;  ///< state or covariance not usable
 constexpr std::size_t kCount = 15;
 }  // namespace condition
 
 constexpr std::array<const char*, condition::kCount> kConditionNames{
-    "Calibrated", "ArmEdge",  "Disarm",    "PreArmFailure", "Start",
-    "ArmedTooLong", "Arrived", "HoldDone", "LegsRemain",    "TouchDown",
-    "Kill",       "Upset",    "OutsideFence", "ImuLost",    "EstimatorUnhealthy"};
+    "Calibrated",   "ArmEdge", "Disarm",       "PreArmFailure", "Start",
+    "ArmedTooLong", "Arrived", "HoldDone",     "LegsRemain",    "TouchDown",
+    "Kill",         "Upset",   "OutsideFence", "ImuLost",       "EstimatorUnhealthy"};
 
 /// Conditions that end a flight at once.
-constexpr ConditionSet kCritical = condition::kKill | condition::kUpset |
-                                   condition::kOutsideFence | condition::kImuLost |
-                                   condition::kEstimatorUnhealthy;
+constexpr ConditionSet kCritical = condition::kKill | condition::kUpset | condition::kOutsideFence |
+                                   condition::kImuLost | condition::kEstimatorUnhealthy;
 
 /// One check before arming: when it fails, arming is refused with its sentence.
 struct PreArmCheck {

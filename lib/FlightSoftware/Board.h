@@ -1,8 +1,8 @@
 /// What the flight software asks of a board, and all it ever sees of one.
 ///
 /// A Board is a class with the members below (a compile-time interface: no virtual call, nothing to
-/// inherit). There are four kinds: the Teensy (src/board), the simulator (tools/strix/core), the log
-/// replay and the emulated Cortex-M7. The flight code is a pure function of what they return.
+/// inherit). There are four kinds: the Teensy (src/board), the simulator (tools/strix/core), the
+/// log replay and the emulated Cortex-M7. The flight code is a pure function of what they return.
 ///
 ///   static constexpr const char* kName; for the log, e.g. "Teensy 4.1"
 ///   std::uint32_t bootId();             differs between two starts, as far as the board can tell
@@ -10,9 +10,8 @@
 ///   SensorSet begin();                  starts buses and devices; returns those that answered.
 ///                                       Called once by setup(), on the ground; may take seconds.
 ///   bool readImu(ImuRaw&);              true and filled when a reading newer than the last one is
-///   bool readMag(MagRaw&);              there. Never waits for one; the time each may take at worst
-///   bool readAlt(AltRaw&);              is the board's stated bound.
-///   bool readGps(GpsRaw&);
+///   bool readMag(MagRaw&);              there. Never waits for one; the time each may take at
+///   worst bool readAlt(AltRaw&);              is the board's stated bound. bool readGps(GpsRaw&);
 ///   PilotSwitches readPilot();          the pilot's switches as they are now
 ///   void writeEsc(const EscCommands&);  M1..M4 in the vehicle's command unit; takes effect at the
 ///                                       next ESC frame

@@ -39,8 +39,8 @@ struct TouchDownConfig {
 
 /// Nothing moves: what arming asks for. Free fall is not rest: the specific force must be g long.
 struct StandstillConfig {
-  float rate = 0.1F;             ///< rad/s
-  float acceleration = 0.5F;     ///< m/s^2, | |a| - g |
+  float rate = 0.1F;          ///< rad/s
+  float acceleration = 0.5F;  ///< m/s^2, | |a| - g |
   Micros duration = 500'000;
 };
 

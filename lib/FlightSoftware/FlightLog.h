@@ -26,7 +26,7 @@ namespace strix {
 
 [[nodiscard]] inline topic::VehicleGpsPosition toRecord(LogTime time, LogTime sampled,
                                                         const GpsRaw& raw) {
-  return {time,          sampled,       raw.latitude, raw.longitude, raw.altitude,
+  return {time,           sampled,       raw.latitude, raw.longitude, raw.altitude,
           raw.speedKnots, raw.courseDeg, raw.hdop,     raw.fix,       raw.satellites};
 }
 
@@ -35,7 +35,8 @@ namespace strix {
   return {time, switchPosition(pilot.arm), switchPosition(pilot.kill), switchPosition(pilot.start)};
 }
 
-[[nodiscard]] inline topic::EstimatorAidSource toRecord(LogTime time, const Innovation& innovation) {
+[[nodiscard]] inline topic::EstimatorAidSource toRecord(LogTime time,
+                                                        const Innovation& innovation) {
   return {time,           innovation.value, innovation.variance,
           innovation.nis, innovation.count, innovation.rejected};
 }
@@ -58,8 +59,8 @@ namespace strix {
   return {{time, toArray(estimate.attitude)},
           {time, toArray(estimate.rateBody)},
           {time, p.x(), p.y(), p.z(), v.x(), v.y(), v.z(), yawOf(estimate.attitude)},
-          {time, toArray(reference.positionNed), toArray(reference.velocityNed), reference.yaw,
-           reference.yawRate},
+          {time, toArray(reference.positionNed), toArray(reference.velocityNed),
+           toArray(reference.accelerationNed), reference.yaw, reference.yawRate},
           {time, toArray(controller.attitudeReference())},
           {time, wanted.thrust, toArray(wanted.torque)},
           {time, achieved.thrust, toArray(achieved.torque)},

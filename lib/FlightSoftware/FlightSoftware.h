@@ -46,8 +46,10 @@ class FlightSoftware {
     standstill_.reset(now);
     touchDown_.reset(now);
     entered_ = now;
-    for (PeriodicTask* task : {&standstillUpdate_, &stateLog_, &switchLog_, &stdLog_}) task->start(now);
-    logger_.begin(time, {config_.vehicle.name, Board::kName, kVersion, kGitCommit, board_.bootId()});
+    for (PeriodicTask* task : {&standstillUpdate_, &stateLog_, &switchLog_, &stdLog_})
+      task->start(now);
+    logger_.begin(time,
+                  {config_.vehicle.name, Board::kName, kVersion, kGitCommit, board_.bootId()});
   }
 
   /// One pass. Nothing in it waits.
@@ -149,10 +151,9 @@ class FlightSoftware {
     sensors_.setStartCalibration(found.gyroBias(), found.groundPressure());
     eskf_.initialize(alignment, gravity);
     const GeoPoint& origin = sensors_.origin();
-    logger_.log(topic::EstimatorStart{time, toArray(found.gyroBias()), gravity,
-                                      toArray(alignment.magReference), found.groundPressure(),
-                                      origin.latitude, origin.longitude,
-                                      toArray(alignment.attitude)});
+    logger_.log(topic::EstimatorStart{
+        time, toArray(found.gyroBias()), gravity, toArray(alignment.magReference),
+        found.groundPressure(), origin.latitude, origin.longitude, toArray(alignment.attitude)});
   }
 
   /// On the ground every fix makes the origin better; it stands still once the motors are armed.
@@ -184,9 +185,8 @@ class FlightSoftware {
     if (row != nullptr || stateLog_.due(now)) {
       stateLog_.postpone(now);
       logger_.log(topic::FlightState{time, conditions, failures,
-                                     static_cast<std::uint8_t>(fsm_.state()),
-                                     fsm_.getControlFlag(), fsm_.getMotorFlag(),
-                                     fsm_.getCriticalErrorFlag()});
+                                     static_cast<std::uint8_t>(fsm_.state()), fsm_.getControlFlag(),
+                                     fsm_.getMotorFlag(), fsm_.getCriticalErrorFlag()});
     }
     logSwitches(now, time, pilot);
   }
@@ -264,9 +264,9 @@ class FlightSoftware {
     return {time, hash.value(), elapsed(now, lastPass_), overruns()};
   }
 
-  template <AidSource kSource>
+  template <AidSource Source>
   void logAid(LogTime time, const Innovation& innovation) {
-    logger_.template logAid<kSource>(toRecord(time, innovation));
+    logger_.template logAid<Source>(toRecord(time, innovation));
   }
 
   void logSwitches(Micros now, LogTime time, const PilotSwitches& pilot) {
@@ -298,7 +298,7 @@ class FlightSoftware {
   PeriodicTask switchLog_{periodFromHz(1)};
   PeriodicTask stdLog_{periodFromHz(50)};
   PilotSwitches loggedPilot_;
-  Micros entered_ = 0;   ///< when the present state began
+  Micros entered_ = 0;  ///< when the present state began
   Micros lastPass_ = 0;
   bool armSwitchWasOn_ = true;  ///< so that a switch held through power-up is no edge
 };

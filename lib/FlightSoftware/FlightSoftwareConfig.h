@@ -23,10 +23,10 @@ struct FlightSoftwareConfig {
   Fence fence{};
   TouchDownConfig touchDown{};
   StandstillConfig standstill{};
-  float declination = 0.0F;              ///< rad, east positive: magnetic to true north
-  std::uint32_t originFixes = 50;        ///< GPS fixes averaged before arming is allowed
-  float armTilt = 20.0F * kDegToRad;     ///< rad, most tilt at arming
-  Micros armedTimeout = 30'000'000;      ///< armed without take-off
+  float declination = 0.0F;           ///< rad, east positive: magnetic to true north
+  std::uint32_t originFixes = 50;     ///< GPS fixes averaged before arming is allowed
+  float armTilt = 20.0F * kDegToRad;  ///< rad, most tilt at arming
+  Micros armedTimeout = 30'000'000;   ///< armed without take-off
 };
 
 }  // namespace strix

@@ -10,10 +10,10 @@ namespace strix {
 
 struct GuidanceConfig {
   RampLimits ramp{1.0F, 0.5F, 1.0F, 45.0F * kDegToRad, 90.0F * kDegToRad};
-  float arrivalRadius = 0.5F;               ///< m
-  float arrivalSpeed = 0.4F;                ///< m/s
-  float arrivalYaw = 10.0F * kDegToRad;     ///< rad
-  float landingDepth = 3.0F;                ///< m below the start the landing ramp aims at
+  float arrivalRadius = 0.5F;            ///< m
+  float arrivalSpeed = 0.4F;             ///< m/s
+  float arrivalYaw = 10.0F * kDegToRad;  ///< rad
+  float landingDepth = 3.0F;             ///< m below the start the landing ramp aims at
 };
 
 class Guidance {
@@ -39,7 +39,8 @@ class Guidance {
         break;
       }
       case FlightState::Land:
-        // Below the ground, so that the descent goes on until touch-down whatever the altimeter says.
+        // Below the ground, so that the descent goes on until touch-down whatever the altimeter
+        // says.
         setTarget({target_.x(), target_.y(), config_.landingDepth}, targetYaw_);
         break;
       default:
@@ -71,8 +72,8 @@ class Guidance {
   [[nodiscard]] bool near(const VehicleState& estimate) const {
     const float yawError = wrapAngle(yawOf(estimate.attitude) - targetYaw_);
     return (estimate.positionNed - target_).norm() < config_.arrivalRadius &&
-           estimate.velocityNed.norm() < config_.arrivalSpeed &&
-           yawError < config_.arrivalYaw && yawError > -config_.arrivalYaw;
+           estimate.velocityNed.norm() < config_.arrivalSpeed && yawError < config_.arrivalYaw &&
+           yawError > -config_.arrivalYaw;
   }
 
   Mission mission_;

@@ -10,20 +10,20 @@ namespace strix {
 
 /// A place to go to and stay at, relative to the start.
 struct Leg {
-  float north;       ///< m
-  float east;        ///< m
-  float height;      ///< m, up
-  float turn;        ///< rad, right of the heading at take-off
-  Micros holdTime;   ///< stay there this long
+  float north;      ///< m
+  float east;       ///< m
+  float height;     ///< m, up
+  float turn;       ///< rad, right of the heading at take-off
+  Micros holdTime;  ///< stay there this long
 };
 
 struct Mission {
   static constexpr std::size_t kMaxLegs = 16;
 
   const char* name;
-  float takeoffHeight;       ///< m
+  float takeoffHeight;  ///< m
   Micros takeoffHoldTime;
-  std::uint8_t legCount;     ///< legs in use, from the first
+  std::uint8_t legCount;  ///< legs in use, from the first
   std::array<Leg, kMaxLegs> legs;
 };
 
@@ -33,8 +33,7 @@ struct Fence {
   float height = 15.0F;  ///< m above the start
 
   [[nodiscard]] bool contains(const Vector3f& positionNed) const {
-    const float horizontal2 =
-        positionNed.x() * positionNed.x() + positionNed.y() * positionNed.y();
+    const float horizontal2 = positionNed.x() * positionNed.x() + positionNed.y() * positionNed.y();
     return horizontal2 <= radius * radius && -positionNed.z() <= height;
   }
 };

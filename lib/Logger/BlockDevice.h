@@ -7,7 +7,9 @@
 ///   bool writeSector(uint32_t index, const uint8_t (&data)[kSectorSize]);
 ///                                                     index counts from the start of the file; the
 ///                                                     last, partial one is written again as it
-///                                                     fills. False: the card failed.
+///                                                     fills. `data` stays valid and unchanged
+///                                                     until busy() is false again, for a card that
+///                                                     reads by DMA. False: the card failed.
 ///   bool sync(uint32_t length);                       makes the first `length` bytes durable and
 ///                                                     the file's size. False: the card failed.
 #pragma once

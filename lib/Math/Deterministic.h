@@ -43,19 +43,27 @@ struct SinCos {
   octant += octant & 1;
   const auto y = static_cast<float>(octant);
   // pi/4 in three parts; the first two products are exact (Cody and Waite).
-  const float r = ((magnitude - y * 0.78515625F) - y * 2.4187564849853515625e-4F) -
-                  y * 3.77489497744594108e-8F;
+  const float r =
+      ((magnitude - y * 0.78515625F) - y * 2.4187564849853515625e-4F) - y * 3.77489497744594108e-8F;
   const float z = r * r;
   const float sine =
       ((-1.9515295891e-4F * z + 8.3321608736e-3F) * z - 1.6666654611e-1F) * z * r + r;
-  const float cosine = ((2.443315711809948e-5F * z - 1.388731625493765e-3F) * z +
-                        4.166664568298827e-2F) * z * z - 0.5F * z + 1.0F;
+  const float cosine =
+      ((2.443315711809948e-5F * z - 1.388731625493765e-3F) * z + 4.166664568298827e-2F) * z * z -
+      0.5F * z + 1.0F;
   SinCos out{sine, cosine};
   switch ((octant >> 1) & 3) {
-    case 1: out = {cosine, -sine}; break;
-    case 2: out = {-sine, -cosine}; break;
-    case 3: out = {-cosine, sine}; break;
-    default: break;
+    case 1:
+      out = {cosine, -sine};
+      break;
+    case 2:
+      out = {-sine, -cosine};
+      break;
+    case 3:
+      out = {-cosine, sine};
+      break;
+    default:
+      break;
   }
   if (x < 0.0F) out.sin = -out.sin;
   return out;
@@ -79,7 +87,9 @@ struct SinCos {
   const float z = t * t;
   const float angle =
       offset + ((((8.05374449538e-2F * z - 1.38776856032e-1F) * z + 1.99777106478e-1F) * z -
-                 3.33329491539e-1F) * z * t + t);
+                 3.33329491539e-1F) *
+                    z * t +
+                t);
   return x < 0.0F ? -angle : angle;
 }
 
@@ -101,8 +111,12 @@ struct SinCos {
   const bool nearOne = magnitude > 0.5F;  // there: asin(a) = pi/2 - 2 asin(sqrt((1 - a) / 2))
   const float z = nearOne ? 0.5F * (1.0F - magnitude) : magnitude * magnitude;
   const float t = nearOne ? squareRoot(z) : magnitude;
-  float angle = ((((4.2163199048e-2F * z + 2.4181311049e-2F) * z + 4.5470025998e-2F) * z +
-                  7.4953002686e-2F) * z + 1.6666752422e-1F) * z * t + t;
+  float angle =
+      ((((4.2163199048e-2F * z + 2.4181311049e-2F) * z + 4.5470025998e-2F) * z + 7.4953002686e-2F) *
+           z +
+       1.6666752422e-1F) *
+          z * t +
+      t;
   if (nearOne) angle = kHalfPi - 2.0F * angle;
   return x < 0.0F ? -angle : angle;
 }
@@ -133,8 +147,18 @@ struct SinCos {
   const auto e = static_cast<float>(exponent);
   const float z = m * m;
   float y = ((((((((7.0376836292e-2F * m - 1.1514610310e-1F) * m + 1.1676998740e-1F) * m -
-                  1.2420140846e-1F) * m + 1.4249322787e-1F) * m - 1.6668057665e-1F) * m +
-               2.0000714765e-1F) * m - 2.4999993993e-1F) * m + 3.3333331174e-1F) * m * z;
+                  1.2420140846e-1F) *
+                     m +
+                 1.4249322787e-1F) *
+                    m -
+                1.6668057665e-1F) *
+                   m +
+               2.0000714765e-1F) *
+                  m -
+              2.4999993993e-1F) *
+                 m +
+             3.3333331174e-1F) *
+            m * z;
   y += -2.12194440e-4F * e;
   y += -0.5F * z;
   return m + y + 0.693359375F * e;
@@ -151,7 +175,12 @@ struct SinCos {
   const auto k = static_cast<float>(n);
   const float r = (x - k * 0.693359375F) - k * -2.12194440e-4F;
   const float p = (((((1.9875691500e-4F * r + 1.3981999507e-3F) * r + 8.3334519073e-3F) * r +
-                     4.1665795894e-2F) * r + 1.6666665459e-1F) * r + 5.0000001201e-1F) * r * r +
+                     4.1665795894e-2F) *
+                        r +
+                    1.6666665459e-1F) *
+                       r +
+                   5.0000001201e-1F) *
+                      r * r +
                   r + 1.0F;
   const auto bits = static_cast<std::uint32_t>(n + 127) << 23U;  // 2^n
   float power = 0.0F;
@@ -166,7 +195,8 @@ struct SinCos {
   const float turns = angle * (0.5F / kPi) + (angle < 0.0F ? -0.5F : 0.5F);
   const auto n = static_cast<float>(static_cast<std::int32_t>(turns));  // nearest
   // 2 pi in three parts, as in sinCos.
-  float wrapped = ((angle - n * 6.28125F) - n * 1.93500518798828125e-3F) - n * 3.0199159819567529e-7F;
+  float wrapped =
+      ((angle - n * 6.28125F) - n * 1.93500518798828125e-3F) - n * 3.0199159819567529e-7F;
   if (wrapped > kPi) wrapped -= 2.0F * kPi;
   if (wrapped <= -kPi) wrapped += 2.0F * kPi;
   return wrapped;

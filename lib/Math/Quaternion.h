@@ -22,10 +22,9 @@ struct Quaternion {
 
 /// Hamilton product p (x) q. Sola (2017), eq. 12.
 [[nodiscard]] inline Quaternion operator*(const Quaternion& p, const Quaternion& q) {
-  return {p.w * q.w - p.x * q.x - p.y * q.y - p.z * q.z,
-          p.w * q.x + p.x * q.w + p.y * q.z - p.z * q.y,
-          p.w * q.y - p.x * q.z + p.y * q.w + p.z * q.x,
-          p.w * q.z + p.x * q.y - p.y * q.x + p.z * q.w};
+  return {
+      p.w * q.w - p.x * q.x - p.y * q.y - p.z * q.z, p.w * q.x + p.x * q.w + p.y * q.z - p.z * q.y,
+      p.w * q.y - p.x * q.z + p.y * q.w + p.z * q.x, p.w * q.z + p.x * q.y - p.y * q.x + p.z * q.w};
 }
 
 [[nodiscard]] inline float norm(const Quaternion& q) {
@@ -46,7 +45,8 @@ struct Quaternion {
 }
 
 /// Rotation vector to unit quaternion, q = [cos(a/2), sin(a/2) v/a], a = |v|.
-/// Second-order series below 1e-3 rad: its error a^4/384 is under one float ulp. Sola (2017), eq. 101.
+/// Second-order series below 1e-3 rad: its error a^4/384 is under one float ulp. Sola (2017), eq.
+/// 101.
 /// @param v  rotation vector, rad
 [[nodiscard]] inline Quaternion quaternionExp(const Vector3f& v) {
   const float angle2 = v.squaredNorm();
@@ -78,7 +78,8 @@ struct Quaternion {
 
 /// Attitude error of `estimate` from `reference`, local (body) frame: alpha = 2 vec(ref* (x) est),
 /// sign chosen so that w >= 0 (DESIGN.md, 2). Its length is 2 sin(angle/2) <= 2.
-[[nodiscard]] inline Vector3f attitudeError(const Quaternion& reference, const Quaternion& estimate) {
+[[nodiscard]] inline Vector3f attitudeError(const Quaternion& reference,
+                                            const Quaternion& estimate) {
   return 2.0F * shortest(conjugate(reference) * estimate).vec();
 }
 

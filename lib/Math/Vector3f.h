@@ -11,18 +11,20 @@ using Matrix3f = Eigen::Matrix<float, 3, 3>;
 /// Cross-product matrix: skew(a) b = a x b. Sola (2017), eq. 73.
 [[nodiscard]] inline Matrix3f skew(const Vector3f& a) {
   Matrix3f s;
-  s << 0.0F, -a.z(), a.y(),   //
-      a.z(), 0.0F, -a.x(),    //
+  s << 0.0F, -a.z(), a.y(),  //
+      a.z(), 0.0F, -a.x(),   //
       -a.y(), a.x(), 0.0F;
   return s;
 }
 
-/// True when no element is NaN or infinite. Written with comparisons that fast-math-free code keeps.
+/// False for NaN and infinity: NaN - NaN and inf - inf are NaN.
+[[nodiscard]] constexpr bool isFinite(float value) { return value - value == 0.0F; }
+
+/// True when no element is NaN or infinite.
 template <class Derived>
 [[nodiscard]] bool isFinite(const Eigen::MatrixBase<Derived>& m) {
   for (Eigen::Index i = 0; i < m.size(); ++i) {
-    const float value = m.derived().coeff(i);
-    if (!(value - value == 0.0F)) return false;  // NaN - NaN and inf - inf are NaN
+    if (!isFinite(m.derived().coeff(i))) return false;
   }
   return true;
 }

@@ -47,19 +47,19 @@ struct BrysonWeights {
 
 struct Vehicle {
   const char* name;
-  float mass;                            ///< kg
-  std::array<float, 3> inertia;          ///< kg m^2, diagonal, body axes
-  std::array<Rotor, kMotorCount> rotors; ///< M1..M4
-  const char* speedUnit;                 ///< unit of rotor speed n in what follows
-  float thrustConstant;                  ///< N / n^2
-  float torqueConstant;                  ///< N m / n^2
-  float motorTimeConstant;               ///< s
-  CommandCurve command;                  ///< ESC command of rotor speed
+  float mass;                             ///< kg
+  std::array<float, 3> inertia;           ///< kg m^2, diagonal, body axes
+  std::array<Rotor, kMotorCount> rotors;  ///< M1..M4
+  const char* speedUnit;                  ///< unit of rotor speed n in what follows
+  float thrustConstant;                   ///< N / n^2
+  float torqueConstant;                   ///< N m / n^2
+  float motorTimeConstant;                ///< s
+  CommandCurve command;                   ///< ESC command of rotor speed
   const char* commandUnit;
-  float commandOff;                      ///< motors stopped
-  float commandMax;                      ///< what the ESC accepts
-  float commandFlightMax;                ///< cap in flight
-  float speedFlightMin;                  ///< n below which a motor never runs in flight
+  float commandOff;        ///< motors stopped
+  float commandMax;        ///< what the ESC accepts
+  float commandFlightMax;  ///< cap in flight
+  float speedFlightMin;    ///< n below which a motor never runs in flight
   BrysonWeights bryson;
 };
 

@@ -15,10 +15,10 @@ struct VehicleState {
 
 /// Where the aircraft should be: what guidance asks of the controller.
 struct Reference {
-  Vector3f positionNed = Vector3f::Zero();  ///< m
-  Vector3f velocityNed = Vector3f::Zero();  ///< m/s
-  float yaw = 0.0F;                         ///< rad
-  float yawRate = 0.0F;                     ///< rad/s
+  Vector3f positionNed = Vector3f::Zero();      ///< m
+  Vector3f velocityNed = Vector3f::Zero();      ///< m/s
+  float yaw = 0.0F;                             ///< rad
+  float yawRate = 0.0F;                         ///< rad/s
   Vector3f accelerationNed = Vector3f::Zero();  ///< m/s^2, fed forward
 };
 

@@ -6,8 +6,8 @@
 namespace strix {
 
 struct Alignment {
-  Quaternion attitude;                        ///< body to NED
-  Vector3f magReference = Vector3f::Zero();   ///< field in NED (true north), uT
+  Quaternion attitude;                       ///< body to NED
+  Vector3f magReference = Vector3f::Zero();  ///< field in NED (true north), uT
 };
 
 /// At rest the specific force is R [0 0 -g], so a_x = g sin(pitch), a_y = -g sin(roll) cos(pitch),
@@ -20,8 +20,7 @@ struct Alignment {
                                           float declination) {
   EulerAngles euler;
   euler.roll = arcTangent2(-accel.y(), -accel.z());
-  euler.pitch =
-      arcTangent2(accel.x(), squareRoot(accel.y() * accel.y() + accel.z() * accel.z()));
+  euler.pitch = arcTangent2(accel.x(), squareRoot(accel.y() * accel.y() + accel.z() * accel.z()));
 
   Alignment out;
   const Vector3f level = rotateToNed(eulerToQuaternion(euler), mag);  // yaw still zero

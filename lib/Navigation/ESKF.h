@@ -124,8 +124,12 @@ inline void ESKF::initialize(const Alignment& alignment, float gravity) {
   const auto square = [](float x) { return x * x; };
   const float tilt = square(config_.tiltSigma0);
   const float heading = square(config_.headingSigma0);
-  covariance_.block<3, 3>(kPosition, kPosition).diagonal().setConstant(square(config_.positionSigma0));
-  covariance_.block<3, 3>(kVelocity, kVelocity).diagonal().setConstant(square(config_.velocitySigma0));
+  covariance_.block<3, 3>(kPosition, kPosition)
+      .diagonal()
+      .setConstant(square(config_.positionSigma0));
+  covariance_.block<3, 3>(kVelocity, kVelocity)
+      .diagonal()
+      .setConstant(square(config_.velocitySigma0));
   covariance_.block<3, 3>(kAlpha, kAlpha) =
       tilt * Matrix3f::Identity() + (heading - tilt) * down * down.transpose();
   started_ = false;
@@ -148,15 +152,14 @@ inline void ESKF::predict(const Vector3f& accel, const Vector3f& gyro, Micros no
   const Matrix3f nedToBody = q2R(state_.attitude);
   propagateCovariance(nedToBody, accel, gyro, dt);
 
-  const Vector3f acceleration =
-      nedToBody.transpose() * accel + Vector3f{0.0F, 0.0F, gravity_};
+  const Vector3f acceleration = nedToBody.transpose() * accel + Vector3f{0.0F, 0.0F, gravity_};
   state_.positionNed += state_.velocityNed * dt + acceleration * (0.5F * dt * dt);
   state_.velocityNed += acceleration * dt;
   state_.attitude = normalized(state_.attitude * quaternionExp(gyro * dt));
 }
 
-inline Matrix9f ESKF::getSTM(const Matrix3f& nedToBody, const Vector3f& accel,
-                             const Vector3f& gyro, float dt) {
+inline Matrix9f ESKF::getSTM(const Matrix3f& nedToBody, const Vector3f& accel, const Vector3f& gyro,
+                             float dt) {
   Matrix9f phi = Matrix9f::Identity();
   phi.block<3, 3>(kPosition, kVelocity).diagonal().setConstant(dt);
   phi.block<3, 3>(kVelocity, kAlpha) = -dt * (nedToBody.transpose() * skew(accel));

@@ -42,10 +42,10 @@ struct NavigationConfig {
   float nisGate = 6.635F;  ///< chi-square, 1 dof, 99 %
 
   // One-sigma uncertainty at alignment.
-  float positionSigma0 = 0.5F;   ///< m
-  float velocitySigma0 = 0.1F;   ///< m/s
-  float tiltSigma0 = 0.03F;      ///< rad
-  float headingSigma0 = 0.10F;   ///< rad
+  float positionSigma0 = 0.5F;  ///< m
+  float velocitySigma0 = 0.1F;  ///< m/s
+  float tiltSigma0 = 0.03F;     ///< rad
+  float headingSigma0 = 0.10F;  ///< rad
 };
 
 }  // namespace strix

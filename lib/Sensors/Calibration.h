@@ -15,7 +15,7 @@ struct ImuCalibration {
 struct MagCalibration {
   /// May be a reflection (determinant -1): the LIS2MDL's axes are left-handed.
   Matrix3f sensorToBody = Matrix3f::Identity();
-  Vector3f hardIron = Vector3f::Zero();          ///< uT, sensor axes
+  Vector3f hardIron = Vector3f::Zero();  ///< uT, sensor axes
   Matrix3f softIron = Matrix3f::Identity();
 };
 

@@ -30,8 +30,8 @@ struct GeoPoint {
 }
 
 /// Local tangent plane at an origin (WGS-84). Differences are taken in integers, so precision does
-/// not depend on where on earth the origin lies. Curvature is neglected: at 1 km it is 8 cm down and
-/// up to 16 cm times tan(latitude) sideways.
+/// not depend on where on earth the origin lies. Curvature is neglected: at 1 km it is 8 cm down
+/// and up to 16 cm times tan(latitude) sideways.
 class LocalFrame {
  public:
   LocalFrame() = default;

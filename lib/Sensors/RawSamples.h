@@ -8,33 +8,33 @@
 namespace strix {
 
 struct ImuRaw {
-  Micros sampled = 0;                   ///< when the sensor measured, on the board's micros()
-  Vector3f accel = Vector3f::Zero();    ///< specific force, m/s^2
-  Vector3f gyro = Vector3f::Zero();     ///< rad/s
-  float temperature = 0.0F;             ///< degC
+  Micros sampled = 0;                 ///< when the sensor measured, on the board's micros()
+  Vector3f accel = Vector3f::Zero();  ///< specific force, m/s^2
+  Vector3f gyro = Vector3f::Zero();   ///< rad/s
+  float temperature = 0.0F;           ///< degC
 };
 
 struct MagRaw {
   Micros sampled = 0;
-  Vector3f field = Vector3f::Zero();    ///< uT
+  Vector3f field = Vector3f::Zero();  ///< uT
 };
 
 struct AltRaw {
   Micros sampled = 0;
-  float pressure = 0.0F;                ///< Pa
-  float temperature = 0.0F;             ///< degC
+  float pressure = 0.0F;     ///< Pa
+  float temperature = 0.0F;  ///< degC
 };
 
 /// One fix, in the receiver's units: an MTK3333 speaks NMEA, so speed comes in knots.
 struct GpsRaw {
   Micros sampled = 0;
-  std::int32_t latitude = 0;            ///< 1e-7 deg, north positive
-  std::int32_t longitude = 0;           ///< 1e-7 deg, east positive
-  std::int32_t altitude = 0;            ///< mm above mean sea level
-  float speedKnots = 0.0F;              ///< over ground
-  float courseDeg = 0.0F;               ///< over ground, clockwise from true north
+  std::int32_t latitude = 0;   ///< 1e-7 deg, north positive
+  std::int32_t longitude = 0;  ///< 1e-7 deg, east positive
+  std::int32_t altitude = 0;   ///< mm above mean sea level
+  float speedKnots = 0.0F;     ///< over ground
+  float courseDeg = 0.0F;      ///< over ground, clockwise from true north
   float hdop = 99.0F;
-  std::uint8_t fix = 0;                 ///< 0 none, 2 two-dimensional, 3 three-dimensional
+  std::uint8_t fix = 0;  ///< 0 none, 2 two-dimensional, 3 three-dimensional
   std::uint8_t satellites = 0;
 };
 

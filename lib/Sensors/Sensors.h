@@ -52,8 +52,9 @@ class SensorTiming {
   }
   [[nodiscard]] bool due(Micros now) const { return task_.due(now); }
   void received(Micros now) {
-    if (lost_) {
+    if (first_) {
       task_.postpone(now);  // a device has its own phase: the wait for its first word is no overrun
+      first_ = false;
     } else {
       task_.done(now);
     }
@@ -63,15 +64,14 @@ class SensorTiming {
   /// Due, but the device gave nothing. Remembers a loss, so that a device long dead does not look
   /// fresh when the clock shows the hour of its last reading again, 71.6 min later.
   void missed(Micros now) { lost_ = lost_ || elapsed(now, heard_) > timeout_; }
-  [[nodiscard]] bool fresh(Micros now) const {
-    return !lost_ && elapsed(now, heard_) <= timeout_;
-  }
+  [[nodiscard]] bool fresh(Micros now) const { return !lost_ && elapsed(now, heard_) <= timeout_; }
   [[nodiscard]] std::uint32_t overruns() const { return task_.overruns(); }
 
  private:
   PeriodicTask task_;
   Micros timeout_;
   Micros heard_ = 0;
+  bool first_ = true;
   bool lost_ = true;  ///< never heard, or silent for too long since
 };
 
@@ -96,21 +96,30 @@ class Sensors {
 
   /// True when the mounting matrices turn vectors and do nothing else.
   [[nodiscard]] bool mountingValid() const {
-    return isMounting(config_.imu.sensorToBody, false) && isMounting(config_.mag.sensorToBody, true);
+    return isMounting(config_.imu.sensorToBody, false) &&
+           isMounting(config_.mag.sensorToBody, true);
   }
 
-  // Each is true when a new reading was taken. A late device is asked again every pass.
+  // Each is true when a new reading was taken. A late device is asked again every pass. A reading
+  // with NaN or infinity is none: it is counted, and a device that gives no other is lost in time.
   [[nodiscard]] bool imuUpdate(Micros now) {
-    return update(imuTiming_, now, [this] { return board_.readImu(imuRaw_); });
+    return update(imuTiming_, now, [this] {
+      return board_.readImu(imuRaw_) && sound(isFinite(imuRaw_.accel) && isFinite(imuRaw_.gyro));
+    });
   }
   [[nodiscard]] bool magUpdate(Micros now) {
-    return update(magTiming_, now, [this] { return board_.readMag(magRaw_); });
+    return update(magTiming_, now,
+                  [this] { return board_.readMag(magRaw_) && sound(isFinite(magRaw_.field)); });
   }
   [[nodiscard]] bool altUpdate(Micros now) {
-    return update(altTiming_, now, [this] { return board_.readAlt(altRaw_); });
+    return update(altTiming_, now,
+                  [this] { return board_.readAlt(altRaw_) && sound(isFinite(altRaw_.pressure)); });
   }
   [[nodiscard]] bool gpsUpdate(Micros now) {
-    return update(gpsTiming_, now, [this] { return board_.readGps(gpsRaw_); });
+    return update(gpsTiming_, now, [this] {
+      return board_.readGps(gpsRaw_) &&
+             sound(isFinite(gpsRaw_.speedKnots) && isFinite(gpsRaw_.courseDeg));
+    });
   }
 
   [[nodiscard]] const ImuRaw& getIMUMeas() const { return imuRaw_; }
@@ -167,6 +176,9 @@ class Sensors {
            gpsTiming_.overruns();
   }
 
+  /// Readings with NaN or infinity since the start.
+  [[nodiscard]] std::uint32_t invalid() const { return invalid_; }
+
  private:
   template <class Read>
   [[nodiscard]] static bool update(SensorTiming& timing, Micros now, Read&& read) {
@@ -174,6 +186,12 @@ class Sensors {
     const bool isNew = read();
     isNew ? timing.received(now) : timing.missed(now);
     return isNew;
+  }
+
+  /// Counts a reading that is not.
+  bool sound(bool isSound) {
+    if (!isSound) ++invalid_;
+    return isSound;
   }
 
   Board& board_;
@@ -189,6 +207,7 @@ class Sensors {
   Vector3f gyroBias_ = Vector3f::Zero();
   float groundPressure_ = 101325.0F;
   LocalFrame frame_;
+  std::uint32_t invalid_ = 0;
 };
 
 }  // namespace strix

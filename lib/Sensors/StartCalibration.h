@@ -25,11 +25,11 @@ class RunningMean {
 };
 
 struct StartCalibrationConfig {
-  Micros duration = 2'000'000;       ///< of standstill that is averaged
-  float gyroMotion = 0.06F;          ///< rad/s from the mean that means "moved"
-  float accelMotion = 0.6F;          ///< m/s^2 from the mean that means "moved"
-  float gyroBiasLimit = 0.2F;        ///< rad/s: a larger mean is a turn, not a bias
-  std::uint32_t imuSamples = 200;    ///< required in `duration`
+  Micros duration = 2'000'000;     ///< of standstill that is averaged
+  float gyroMotion = 0.06F;        ///< rad/s from the mean that means "moved"
+  float accelMotion = 0.6F;        ///< m/s^2 from the mean that means "moved"
+  float gyroBiasLimit = 0.2F;      ///< rad/s: a larger mean is a turn, not a bias
+  std::uint32_t imuSamples = 200;  ///< required in `duration`
   std::uint32_t magSamples = 20;
   std::uint32_t altSamples = 20;
 };

@@ -119,6 +119,17 @@ void test_an_imu_silent_for_more_than_20_ms_stops_the_motors() {
   }
 }
 
+void test_an_imu_that_gives_only_nan_is_as_good_as_silent() {
+  FakeFlight flight;
+  flight.getReady();
+  flight.reach(FlightState::Hold);
+  flight.board.imu.reading.gyro.y() = kNaN;
+  flight.run(0.026F);
+  TEST_ASSERT_TRUE(flight.state() == FlightState::Safe);
+  TEST_ASSERT_TRUE(areOff(flight.board.esc()));
+  TEST_ASSERT_TRUE(flight.logSays("IMU lost: motors off"));
+}
+
 void test_a_short_silence_of_the_imu_stops_nothing() {
   FakeFlight flight;
   flight.getReady();
@@ -178,7 +189,7 @@ void test_a_sick_estimator_stops_the_motors() {
     FakeFlight flight;
     flight.getReady();
     flight.reach(state);
-    flight.board.imu.reading.gyro.y() = kNaN;
+    flight.board.imu.reading.gyro.y() = 1e30F;
     flight.run(0.006F);
     TEST_ASSERT_TRUE(flight.state() == FlightState::Safe);
     TEST_ASSERT_TRUE(areOff(flight.board.esc()));
@@ -230,6 +241,7 @@ void runMotorsOffTests() {
   RUN_TEST(test_a_trouble_that_has_lasted_does_not_delay_disarming_either);
   RUN_TEST(test_disarming_on_the_ground_leads_to_idle_and_in_flight_to_safe);
   RUN_TEST(test_an_imu_silent_for_more_than_20_ms_stops_the_motors);
+  RUN_TEST(test_an_imu_that_gives_only_nan_is_as_good_as_silent);
   RUN_TEST(test_a_short_silence_of_the_imu_stops_nothing);
   RUN_TEST(test_a_tilt_past_90_deg_stops_the_motors_whichever_way_it_goes);
   RUN_TEST(test_leaving_the_fence_stops_the_motors);

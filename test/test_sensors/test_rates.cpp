@@ -1,6 +1,8 @@
 // When sensors are asked, what happens when they are silent, and that no reading is made up.
 #include <unity.h>
 
+#include <limits>
+
 #include "FakeBoard.h"
 #include "Sensors.h"
 #include "suites.h"
@@ -52,6 +54,24 @@ void test_the_imu_is_read_1000_times_a_second() {
       }
     }
   }
+}
+
+void test_a_reading_with_nan_or_infinity_is_none() {
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  Bench bench;
+  for (const float bad : {kNaN, kInfinity, -kInfinity}) {
+    bench.board.imu.reading.accel.z() = bad;
+    bench.board.mag.reading.field.x() = bad;
+    bench.board.alt.reading.pressure = bad;
+    bench.board.gps.reading.speedKnots = bad;
+    TEST_ASSERT_EQUAL_UINT32(0, bench.readings(1'000'000, 1000, kImu));
+    TEST_ASSERT_EQUAL_UINT32(0, bench.readings(1'000'000, 1000, kMag));
+    TEST_ASSERT_EQUAL_UINT32(0, bench.readings(1'000'000, 1000, kAlt));
+    TEST_ASSERT_EQUAL_UINT32(0, bench.readings(1'000'000, 1000, kGps));
+  }
+  TEST_ASSERT_FALSE(bench.sensors.imuFresh(bench.board.now()));
+  TEST_ASSERT_TRUE(bench.sensors.invalid() > 3000);
 }
 
 void test_the_slower_sensors_keep_their_rates_too() {
@@ -201,6 +221,7 @@ void test_a_sensor_that_died_an_hour_ago_does_not_come_back_with_the_clock() {
 void runRateTests() {
   Unity.TestFile = __FILE__;
   RUN_TEST(test_the_imu_is_read_1000_times_a_second);
+  RUN_TEST(test_a_reading_with_nan_or_infinity_is_none);
   RUN_TEST(test_the_slower_sensors_keep_their_rates_too);
   RUN_TEST(test_a_device_slower_than_its_task_sets_the_rate_and_nothing_is_read_twice);
   RUN_TEST(test_a_reading_comes_through_as_it_was_measured_and_only_once);

@@ -12,10 +12,8 @@ namespace strix {
 /// Never busy. The file ends where the last sync said it does, as the card's would.
 class FileCard {
  public:
-  explicit FileCard(const std::string& path) : path_(path), file_(std::fopen(path.c_str(), "wb+")) {}
-
-  FileCard(const FileCard&) = delete;
-  FileCard& operator=(const FileCard&) = delete;
+  explicit FileCard(const std::string& path)
+      : path_(path), file_(std::fopen(path.c_str(), "wb+")) {}
 
   /// False when the file could not be made; errno says why.
   [[nodiscard]] bool open() const { return file_ != nullptr; }

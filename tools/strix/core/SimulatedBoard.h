@@ -15,7 +15,8 @@ class SimulatedBoard {
   using Card = FileCard;
   static constexpr const char* kName = "simulator";
 
-  SimulatedBoard(const std::string& logPath, std::uint32_t bootId) : card_(logPath), bootId_(bootId) {}
+  SimulatedBoard(const std::string& logPath, std::uint32_t bootId)
+      : card_(logPath), bootId_(bootId) {}
 
   // What a Board offers (Board.h).
   [[nodiscard]] std::uint32_t bootId() const { return bootId_; }

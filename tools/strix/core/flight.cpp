@@ -36,8 +36,11 @@ strix::Mission makeMission(const std::string& name, float takeoffHeight, float t
     throw std::invalid_argument("a mission has at most " +
                                 std::to_string(strix::Mission::kMaxLegs) + " legs");
   }
-  strix::Mission mission{name.c_str(), takeoffHeight, toMicros(takeoffHold),
-                         static_cast<std::uint8_t>(legs.size()), {}};
+  strix::Mission mission{name.c_str(),
+                         takeoffHeight,
+                         toMicros(takeoffHold),
+                         static_cast<std::uint8_t>(legs.size()),
+                         {}};
   for (std::size_t i = 0; i < legs.size(); ++i) {
     mission.legs[i] = {legs[i][0], legs[i][1], legs[i][2], legs[i][3], toMicros(legs[i][4])};
   }
@@ -58,10 +61,10 @@ class Flight {
          const std::string& logPath, std::uint32_t bootId, strix::Micros startTime)
       : missionName_(missionName),
         board_(logPath, bootId),
-        software_(board_, strix::flightConfig(airframe(vehicle).vehicle, airframe(vehicle).gains,
-                                              makeMission(missionName_, takeoffHeight, takeoffHold,
-                                                          legs),
-                                              declination)) {
+        software_(board_,
+                  strix::flightConfig(airframe(vehicle).vehicle, airframe(vehicle).gains,
+                                      makeMission(missionName_, takeoffHeight, takeoffHold, legs),
+                                      declination)) {
     if (!board_.card().open()) {
       throw std::invalid_argument(logPath + ": cannot be written: " + std::strerror(errno));
     }
@@ -81,10 +84,10 @@ class Flight {
     board_.put(strix::AltRaw{sampled, pressure, temperature});
   }
   void putGps(strix::Micros sampled, std::int32_t latitude, std::int32_t longitude,
-              std::int32_t altitude, float speedKnots, float courseDeg, float hdop, std::uint8_t fix,
-              std::uint8_t satellites) {
-    board_.put(strix::GpsRaw{sampled, latitude, longitude, altitude, speedKnots, courseDeg, hdop, fix,
-                             satellites});
+              std::int32_t altitude, float speedKnots, float courseDeg, float hdop,
+              std::uint8_t fix, std::uint8_t satellites) {
+    board_.put(strix::GpsRaw{sampled, latitude, longitude, altitude, speedKnots, courseDeg, hdop,
+                             fix, satellites});
   }
 
   /// One pass of the loop at `now`.
@@ -118,11 +121,13 @@ class Flight {
 }  // namespace
 
 void bindFlight(nb::module_& m) {
-  nb::class_<Flight>(m, "Flight", "The flight software on a simulated board. Times are Micros (uint32, us).")
-      .def(nb::init<const std::string&, const std::string&, float, float, const std::vector<LegRow>&,
-                    float, const std::string&, std::uint32_t, strix::Micros>(),
-           "vehicle"_a, "mission"_a, "takeoff_height_m"_a, "takeoff_hold_s"_a, "legs"_a,
-           "declination_rad"_a, "log_path"_a, "boot_id"_a, "start_time_us"_a)
+  nb::class_<Flight>(m, "Flight",
+                     "The flight software on a simulated board. Times are Micros (uint32, us).")
+      .def(
+          nb::init<const std::string&, const std::string&, float, float, const std::vector<LegRow>&,
+                   float, const std::string&, std::uint32_t, strix::Micros>(),
+          "vehicle"_a, "mission"_a, "takeoff_height_m"_a, "takeoff_hold_s"_a, "legs"_a,
+          "declination_rad"_a, "log_path"_a, "boot_id"_a, "start_time_us"_a)
       .def("set_switches", &Flight::setSwitches, "arm"_a, "start"_a, "kill"_a)
       .def("put_imu", &Flight::putImu, "sampled_us"_a, "accel_m_s2"_a, "gyro_rad_s"_a,
            "temperature_degc"_a)
@@ -131,7 +136,8 @@ void bindFlight(nb::module_& m) {
       .def("put_gps", &Flight::putGps, "sampled_us"_a, "latitude_1e7_deg"_a, "longitude_1e7_deg"_a,
            "altitude_mm"_a, "speed_knots"_a, "course_deg"_a, "hdop"_a, "fix"_a, "satellites"_a)
       .def("loop", &Flight::loop, "now_us"_a, "One pass; returns the ESC commands M1..M4 after it")
-      .def("close", &Flight::close, "Writes the rest of the log; true when all of it is on the disk")
+      .def("close", &Flight::close,
+           "Writes the rest of the log; true when all of it is on the disk")
       .def_prop_ro("state_name", &Flight::stateName)
       .def_prop_ro("motors_on", &Flight::motorsOn)
       .def_prop_ro("attitude", &Flight::attitude, "Estimate, [w x y z], body to NED")

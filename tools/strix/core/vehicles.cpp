@@ -105,9 +105,12 @@ std::vector<std::string> stateNames() {
 }  // namespace
 
 void bindVehicles(nb::module_& m) {
-  m.def("vehicle", &vehicle, "name"_a, "Numbers of an airframe; KeyError when there is none of that name");
+  m.def("vehicle", &vehicle, "name"_a,
+        "Numbers of an airframe; KeyError when there is none of that name");
   m.def("vehicle_names", &vehicleNames);
-  m.def("missions", &missions, "Missions that are part of the flight code; legs are (north m, east m, height m, turn rad, hold s)");
+  m.def("missions", &missions,
+        "Missions that are part of the flight code; legs are (north m, east m, height m, turn rad, "
+        "hold s)");
   m.def("state_names", &stateNames, "Names of the flight states, by their number in the log");
   m.attr("CONTROL_RATE_HZ") = strix::Controller::kRateHz;
 }
