@@ -94,7 +94,7 @@ class FlightSoftware {
     if (sensors_.gpsUpdate(now)) {
       const GpsRaw& raw = sensors_.getGPSMeas();
       if (sensors_.gpsUsable(raw)) {
-        if (!motors_.armed()) averageOrigin(raw);
+        if (!everArmed_) averageOrigin(raw);
         if (!calibrating()) {
           const GpsSample gps = sensors_.processGPSMeas(raw);
           eskf_.updateGPSMeas(gps.positionNed, gps.velocityNed);
@@ -156,7 +156,8 @@ class FlightSoftware {
         found.groundPressure(), origin.latitude, origin.longitude, toArray(alignment.attitude)});
   }
 
-  /// On the ground every fix makes the origin better; it stands still once the motors are armed.
+  /// Before the first flight every fix makes the origin better. Then it stands still, also when the
+  /// aircraft has landed somewhere else.
   void averageOrigin(const GpsRaw& raw) {
     origin_.add(Sensors<Board>::geoPoint(raw));
     sensors_.setOrigin(origin_.origin());
@@ -179,6 +180,7 @@ class FlightSoftware {
       touchDown_.reset(now);
       guidance_.enter(fsm_.state(), now, estimate);
       if (fsm_.getMotorFlag() && !motors_.armed()) motors_.arm();
+      everArmed_ = everArmed_ || motors_.armed();
       if (!fsm_.getMotorFlag() && motors_.armed()) motors_.disarm();
       say(time, *row, failures);
     }
@@ -300,6 +302,7 @@ class FlightSoftware {
   PilotSwitches loggedPilot_;
   Micros entered_ = 0;  ///< when the present state began
   Micros lastPass_ = 0;
+  bool everArmed_ = false;
   bool armSwitchWasOn_ = true;  ///< so that a switch held through power-up is no edge
 };
 

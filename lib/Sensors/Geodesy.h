@@ -21,6 +21,13 @@ struct GeoPoint {
   std::int32_t altitude = 0;   ///< mm
 };
 
+/// False for numbers that no receiver near the ground can mean.
+[[nodiscard]] constexpr bool isOnEarth(const GeoPoint& p) {
+  return p.latitude >= -900'000'000 && p.latitude <= 900'000'000 &&  //
+         p.longitude >= -1'800'000'000 && p.longitude <= 1'800'000'000 &&
+         p.altitude >= -1'000'000 && p.altitude <= 20'000'000;  // 1 km below the sea to 20 km up
+}
+
 /// The way east from one longitude to another, the short way round the earth, 1e-7 deg.
 [[nodiscard]] constexpr std::int64_t longitudeStep(std::int64_t to, std::int64_t from) {
   constexpr std::int64_t kHalfTurn = 1'800'000'000;

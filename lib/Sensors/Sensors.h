@@ -152,7 +152,7 @@ class Sensors {
   /// A fix good enough to navigate by.
   [[nodiscard]] bool gpsUsable(const GpsRaw& raw) const {
     return raw.fix >= 3 && raw.satellites >= config_.gpsMinSatellites &&
-           raw.hdop <= config_.gpsMaxHdop;
+           raw.hdop <= config_.gpsMaxHdop && isOnEarth(geoPoint(raw));
   }
 
   [[nodiscard]] static GeoPoint geoPoint(const GpsRaw& raw) {

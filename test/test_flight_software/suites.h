@@ -5,4 +5,5 @@ void runArmingTests();
 void runMotorsOffTests();
 void runLoopTests();
 void runBadInputTests();
+void runMissionTests();
 void runHeapTests();

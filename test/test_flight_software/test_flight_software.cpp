@@ -11,6 +11,7 @@ int main() {
   runMotorsOffTests();
   runLoopTests();
   runBadInputTests();
+  runMissionTests();
   runHeapTests();
   UNITY_END();
   return 0;

@@ -1,5 +1,6 @@
 // The loop's rates, its clock that wraps, and that it waits for nothing.
 #include <cstring>
+#include <limits>
 #include <vector>
 
 #include "FakeFlight.h"
@@ -187,6 +188,36 @@ void test_the_origin_stands_still_once_the_motors_are_armed() {
   TEST_ASSERT_EQUAL_INT32(origin.latitude, flight.software.sensors().origin().latitude);
 }
 
+void test_the_origin_stays_where_it_was_after_landing_somewhere_else() {
+  // Or home would wander to the landing place while the aircraft waits there.
+  FakeFlight flight;
+  flight.getReady();
+  flight.reach(FlightState::Land);
+  const GeoPoint origin = flight.software.sensors().origin();
+  flight.board.gps.reading.latitude += 200;  // 2 m north
+  TEST_ASSERT_TRUE(flight.runUntil(FlightState::Idle, 5.0F));
+  flight.run(10.0F);
+  TEST_ASSERT_EQUAL_INT32(origin.latitude, flight.software.sensors().origin().latitude);
+}
+
+void test_a_fix_that_is_not_on_earth_does_not_move_the_origin() {
+  FakeFlight flight;
+  flight.software.setup();
+  flight.run(3.0F);
+  const GpsRaw good = flight.board.gps.reading;
+  flight.board.gps.reading.latitude = -1'686'134'375;
+  flight.run(0.3F);
+  flight.board.gps.reading = good;
+  flight.board.gps.reading.longitude = 2'000'000'000;
+  flight.run(0.3F);
+  flight.board.gps.reading = good;
+  flight.board.gps.reading.altitude = std::numeric_limits<std::int32_t>::min();
+  flight.run(0.3F);
+  TEST_ASSERT_EQUAL_INT32(good.latitude, flight.software.sensors().origin().latitude);
+  TEST_ASSERT_EQUAL_INT32(good.longitude, flight.software.sensors().origin().longitude);
+  TEST_ASSERT_EQUAL_INT32(good.altitude, flight.software.sensors().origin().altitude);
+}
+
 }  // namespace
 
 void runLoopTests() {
@@ -201,4 +232,6 @@ void runLoopTests() {
   RUN_TEST(test_a_loop_fast_enough_counts_no_overrun);
   RUN_TEST(test_one_slow_pass_is_an_overrun_and_not_a_fall);
   RUN_TEST(test_the_origin_stands_still_once_the_motors_are_armed);
+  RUN_TEST(test_the_origin_stays_where_it_was_after_landing_somewhere_else);
+  RUN_TEST(test_a_fix_that_is_not_on_earth_does_not_move_the_origin);
 }

@@ -179,6 +179,12 @@ void test_only_a_sharp_three_dimensional_fix_is_navigated_by() {
   refused([](GpsRaw& raw) { raw.satellites = 5; });
   refused([](GpsRaw& raw) { raw.hdop = 2.6F; });
   refused([](GpsRaw& raw) { raw.hdop = kNaN; });
+  refused([](GpsRaw& raw) { raw.latitude = 900'000'001; });
+  refused([](GpsRaw& raw) { raw.latitude = -900'000'001; });
+  refused([](GpsRaw& raw) { raw.longitude = 1'800'000'001; });
+  refused([](GpsRaw& raw) { raw.longitude = -1'800'000'001; });
+  refused([](GpsRaw& raw) { raw.altitude = 20'000'001; });
+  refused([](GpsRaw& raw) { raw.altitude = -1'000'001; });
   TEST_ASSERT_FALSE(bench.sensors.gpsUsable(GpsRaw{}));  // nothing heard yet
 }
 

@@ -42,14 +42,15 @@ class FlightPlan:
     heading_deg: float
     seed: int
     sensors: SensorConstants = DEFAULT_CONSTANTS
+    arm_at_s: float = ARM_AT_S
 
 
 class Pilot:
     """Moves the switches: arms after the standstill, starts the mission, lets go after landing."""
 
-    def __init__(self) -> None:
+    def __init__(self, arm_at_s: float) -> None:
         self._arm_since_s: float | None = None
-        self._retry_at_s = ARM_AT_S
+        self._retry_at_s = arm_at_s
         self._flew = False
         self.done_at_s: float | None = None
 
@@ -91,7 +92,7 @@ def fly(
         boot_id=plan.seed,
         start_time_us=plant.truth.time_us,
     )
-    pilot = Pilot()
+    pilot = Pilot(plan.arm_at_s)
     recorder = TruthRecorder()
     commands = flight.loop(plant.truth.time_us)
     step = 0

@@ -62,7 +62,9 @@ def _plans() -> dict[str, FlightPlan]:
     }
     ideal = {
         f"ideal {heading:g}": replace(
-            make_plan("Quad5in", "first-flight", "calm", heading, seed=1), sensors=IDEAL
+            make_plan("Quad5in", "first-flight", "calm", heading, seed=1),
+            sensors=IDEAL,
+            arm_at_s=8.0,  # without noise there is nothing to average for long
         )
         for heading in HEADINGS_DEG
     }
