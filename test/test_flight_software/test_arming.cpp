@@ -50,7 +50,8 @@ void test_a_switch_held_through_power_up_never_arms() {
   flight.run(20.0F);
   TEST_ASSERT_TRUE(flight.state() == FlightState::Idle);
   for (const auto& write : flight.board.escWrites) TEST_ASSERT_TRUE(areOff(write.commands));
-  TEST_ASSERT_TRUE(flight.arm());  // released and thrown, it does
+  TEST_ASSERT_FALSE(flight.logSays("arming refused"));  // it was no attempt either
+  TEST_ASSERT_TRUE(flight.arm());                       // released and thrown, it does
 }
 
 void test_a_switch_thrown_too_early_must_be_thrown_again() {
