@@ -60,12 +60,9 @@ class FlightSoftware {
     if (sensors_.imuUpdate(now)) {
       const ImuRaw& raw = sensors_.getIMUMeas();
       const ImuSample imu = sensors_.processIMUMeas(raw);
-      if (calibrating()) {
-        startCalibration_.addImu(imu.sampled, imu.accel, imu.gyro);
-      } else {
-        eskf_.predict(imu.accel, imu.gyro, imu.sampled);
-        eskf_.updateTiltMeas(imu.accel);
-      }
+      startCalibration_.addImu(imu.sampled, imu.accel, imu.gyro);  // until it is done;
+      eskf_.predict(imu.accel, imu.gyro, imu.sampled);             // from then on
+      eskf_.updateTiltMeas(imu.accel);
       observeStandstill(now, imu);
       logger_.logIMU(toRecord(time, clock_.at(raw.sampled), raw));
       logAid<AidSource::Tilt>(time, eskf_.tiltInnovation());
@@ -73,21 +70,15 @@ class FlightSoftware {
     if (sensors_.magUpdate(now)) {
       const MagRaw& raw = sensors_.getMagMeas();
       const Vector3f field = sensors_.processMagMeas(raw);
-      if (calibrating()) {
-        startCalibration_.addMag(field);
-      } else {
-        eskf_.updateMagMeas(field, now);
-      }
+      startCalibration_.addMag(field);
+      eskf_.updateMagMeas(field, now);
       logger_.logMag(toRecord(time, clock_.at(raw.sampled), raw));
       logAid<AidSource::Magnetometer>(time, eskf_.magInnovation());
     }
     if (sensors_.altUpdate(now)) {
       const AltRaw& raw = sensors_.getAltMeas();
-      if (calibrating()) {
-        startCalibration_.addPressure(raw.pressure);
-      } else {
-        eskf_.updateAltMeas(sensors_.processAltMeas(raw), now);
-      }
+      startCalibration_.addPressure(raw.pressure);
+      eskf_.updateAltMeas(sensors_.processAltMeas(raw), now);
       logger_.logAlt(toRecord(time, clock_.at(raw.sampled), raw));
       logAid<AidSource::Altimeter>(time, eskf_.altInnovation());
     }
@@ -95,10 +86,8 @@ class FlightSoftware {
       const GpsRaw& raw = sensors_.getGPSMeas();
       if (sensors_.gpsUsable(raw)) {
         if (!everArmed_) averageOrigin(raw);
-        if (!calibrating()) {
-          const GpsSample gps = sensors_.processGPSMeas(raw);
-          eskf_.updateGPSMeas(gps.positionNed, gps.velocityNed);
-        }
+        const GpsSample gps = sensors_.processGPSMeas(raw);
+        eskf_.updateGPSMeas(gps.positionNed, gps.velocityNed);
       }
       logger_.logGPS(toRecord(time, clock_.at(raw.sampled), raw));
       logAid<AidSource::Gps>(time, eskf_.gpsInnovation());

@@ -20,7 +20,7 @@ class ESKF {
 
   explicit ESKF(const NavigationConfig& config) : config_(config) {}
 
-  /// Starts from rest at the origin with a known attitude.
+  /// Starts from rest at the origin with a known attitude. Until then every call below does nothing.
   /// @param gravity  norm of the specific force at rest, m/s^2
   void initialize(const Alignment& alignment, float gravity);
 
@@ -105,7 +105,8 @@ class ESKF {
   Micros lastPredict_ = 0;
   Micros lastMag_ = 0;
   Micros lastAlt_ = 0;
-  bool started_ = false;
+  bool aligned_ = false;
+  bool started_ = false;  ///< has predicted since
 };
 
 /// A longer gap between two samples is taken as this long: the state is then no longer trusted by
@@ -113,6 +114,7 @@ class ESKF {
 constexpr Micros kMaxPredictStep = 200'000;
 
 inline void ESKF::initialize(const Alignment& alignment, float gravity) {
+  aligned_ = true;
   state_ = VehicleState{};
   state_.attitude = alignment.attitude;
   magReference_ = alignment.magReference;
@@ -136,6 +138,7 @@ inline void ESKF::initialize(const Alignment& alignment, float gravity) {
 }
 
 inline void ESKF::predict(const Vector3f& accel, const Vector3f& gyro, Micros now) {
+  if (!aligned_) return;
   state_.rateBody = gyro;
   if (!started_) {
     started_ = true;
@@ -230,6 +233,7 @@ inline void ESKF::updateTiltMeas(const Vector3f& accel) {
 
 inline void ESKF::updateMagMeas(const Vector3f& mag, Micros now) {
   mag_.begin();
+  if (!aligned_) return;
   const Micros since = elapsed(now, lastMag_);
   lastMag_ = now;
   if (!started_ || magReference_.isZero(0.0F) || since == 0) return;
@@ -240,6 +244,7 @@ inline void ESKF::updateMagMeas(const Vector3f& mag, Micros now) {
 
 inline void ESKF::updateAltMeas(float height, Micros now) {
   alt_.begin();
+  if (!aligned_) return;
   const Micros since = elapsed(now, lastAlt_);
   lastAlt_ = now;
   if (!started_ || since == 0) return;
@@ -250,6 +255,7 @@ inline void ESKF::updateAltMeas(float height, Micros now) {
 
 inline void ESKF::updateGPSMeas(const Vector3f& positionNed, const Vector3f& velocityNed) {
   gps_.begin();
+  if (!aligned_) return;
   const float age = toSeconds(config_.gpsDelay);
   const float rp = config_.gpsPositionSigma * config_.gpsPositionSigma;
   const float rv = config_.gpsVelocitySigma * config_.gpsVelocitySigma;
@@ -264,6 +270,7 @@ inline void ESKF::updateGPSMeas(const Vector3f& positionNed, const Vector3f& vel
 
 inline void ESKF::updateStandstill() {
   standstill_.begin();
+  if (!aligned_) return;
   const float variance = config_.standstillSigma * config_.standstillSigma;
   for (int axis = 0; axis < 3; ++axis) {
     scalarGPSAltUpdate(standstill_, -state_.velocityNed(axis), kVelocity + axis, variance);

@@ -13,6 +13,7 @@ namespace {
 unsigned allocations = 0;
 }
 
+// NOLINTBEGIN(bugprone-reserved-identifier,readability-*): the names are glibc's
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);
@@ -36,6 +37,7 @@ void* aligned_alloc(std::size_t alignment, std::size_t size) {
   return __libc_memalign(alignment, size);
 }
 }
+// NOLINTEND(bugprone-reserved-identifier,readability-*)
 #endif
 
 using namespace strix;

@@ -91,7 +91,7 @@ bool same(const Script& a, const Script& b) {
     return false;
   }
   for (std::size_t i = 0; i < a.writes.size(); ++i) {
-    // Bit for bit.
+    // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bit for bit is what is claimed
     if (a.writes[i].time != b.writes[i].time ||
         std::memcmp(&a.writes[i].commands, &b.writes[i].commands, sizeof(EscCommands)) != 0) {
       return false;

@@ -130,7 +130,9 @@ void test_inverse_functions_logarithm_and_exponential_are_within_3_ulp() {
 void test_arc_cosine_resolves_the_smallest_angles() {
   // The neighbour of 1 below is an angle of 3.5e-4 rad; pi/2 - asin(x) would be 3e-8 rad off, 1e-4
   // of it.
-  for (float x = 1.0F; x > 0.99999F; x = std::nextafterf(x, 0.0F)) {
+  float x = 1.0F;
+  while (x > 0.99999F) {
+    x = std::nextafterf(x, 0.0F);
     Errors error;
     note(error, arcCosine(x), std::acos(static_cast<double>(x)));
     TEST_ASSERT_TRUE(error.ulp < kUlpError);

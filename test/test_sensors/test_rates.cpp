@@ -204,7 +204,7 @@ void test_a_sensor_that_died_an_hour_ago_does_not_come_back_with_the_clock() {
     TEST_ASSERT_TRUE((bench.sensors.*sensor.update)(bench.board.now()));
     silence(bench.board, true);
     const std::uint64_t wrap = std::uint64_t{1} << 32U;
-    while (bench.board.time() < wrap + 2 * sensor.timeout) {
+    while (bench.board.time() < wrap + 2 * std::uint64_t{sensor.timeout}) {
       TEST_ASSERT_FALSE((bench.sensors.*sensor.update)(bench.board.now()));
       if (bench.board.time() > sensor.timeout) {
         TEST_ASSERT_FALSE_MESSAGE((bench.sensors.*sensor.fresh)(bench.board.now()), sensor.name);
