@@ -170,7 +170,10 @@ class FlightSoftware {
       guidance_.enter(fsm_.state(), now, estimate);
       if (fsm_.getMotorFlag() && !motors_.armed()) motors_.arm();
       everArmed_ = everArmed_ || motors_.armed();
-      if (!fsm_.getMotorFlag() && motors_.armed()) motors_.disarm();
+      if (!fsm_.getMotorFlag() && motors_.armed()) {
+        motors_.disarm();
+        motors_.writeESC(board_);  // now, not at the next control tick
+      }
       say(time, *row, failures);
     }
     if (row != nullptr || stateLog_.due(now)) {
@@ -235,8 +238,8 @@ class FlightSoftware {
 
   /// Tells the pilot and the log what happened, and why arming was refused.
   void say(LogTime time, const Transition& row, ConditionSet failures) {
-    const bool critical = row.to == FlightState::Safe;
-    logger_.logText(critical ? ulog::LogLevel::Error : ulog::LogLevel::Info, time, row.said);
+    const bool cutOff = row.to == FlightState::Safe && (row.from & in(FlightState::Safe)) == 0;
+    logger_.logText(cutOff ? ulog::LogLevel::Error : ulog::LogLevel::Info, time, row.said);
     if (row.to != FlightState::Armed && (row.when & condition::kArmEdge) != 0) {
       logger_.logText(ulog::LogLevel::Warning, time, firstRefusal(failures));
     }

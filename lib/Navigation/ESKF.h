@@ -20,7 +20,8 @@ class ESKF {
 
   explicit ESKF(const NavigationConfig& config) : config_(config) {}
 
-  /// Starts from rest at the origin with a known attitude. Until then every call below does nothing.
+  /// Starts from rest at the origin with a known attitude. Until then every call below does
+  /// nothing.
   /// @param gravity  norm of the specific force at rest, m/s^2
   void initialize(const Alignment& alignment, float gravity);
 

@@ -85,19 +85,23 @@ struct Script {
   }
 };
 
+template <class T>
+bool sameBits(const T& a, const T& b) {
+  return std::memcmp(&a, &b, sizeof a) == 0;  // NOLINT(bugprone-suspicious-memory-comparison)
+}
+
 bool same(const Script& a, const Script& b) {
   if (a.states != b.states || a.overruns != b.overruns || a.logBytes != b.logBytes ||
       a.writes.size() != b.writes.size()) {
     return false;
   }
   for (std::size_t i = 0; i < a.writes.size(); ++i) {
-    // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bit for bit is what is claimed
     if (a.writes[i].time != b.writes[i].time ||
-        std::memcmp(&a.writes[i].commands, &b.writes[i].commands, sizeof(EscCommands)) != 0) {
+        !sameBits(a.writes[i].commands, b.writes[i].commands)) {
       return false;
     }
   }
-  return std::memcmp(&a.estimate.attitude, &b.estimate.attitude, sizeof(Quaternion)) == 0 &&
+  return sameBits(a.estimate.attitude, b.estimate.attitude) &&
          a.estimate.positionNed == b.estimate.positionNed &&
          a.estimate.velocityNed == b.estimate.velocityNed;
 }
