@@ -73,6 +73,7 @@ Dict vehicle(const std::string& name) {
 
 std::vector<std::string> vehicleNames() {
   std::vector<std::string> names;
+  names.reserve(strix::kAirframes.size());
   for (const strix::Airframe& airframe : strix::kAirframes) {
     names.emplace_back(airframe.vehicle.name);
   }
@@ -98,6 +99,7 @@ std::vector<Dict> missions() { return {Dict(mission(strix::kFirstFlight))}; }
 
 std::vector<std::string> stateNames() {
   std::vector<std::string> names;
+  names.reserve(strix::kStates.size());
   for (const strix::StateProperties& state : strix::kStates) names.emplace_back(state.name);
   return names;
 }
