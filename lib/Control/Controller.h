@@ -128,12 +128,10 @@ class Controller {
   }
 
   [[nodiscard]] static bool finite(const Reference& r, const VehicleState& s) {
-    const Eigen::Matrix<float, 6, 1> scalars =
-        (Eigen::Matrix<float, 6, 1>() << s.attitude.w, s.attitude.vec(), r.yaw, r.yawRate)
-            .finished();
-    return isFinite(scalars) && isFinite(s.positionNed) && isFinite(s.velocityNed) &&
-           isFinite(s.rateBody) && isFinite(r.positionNed) && isFinite(r.velocityNed) &&
-           isFinite(r.accelerationNed);
+    return isFinite(s.attitude.w) && isFinite(s.attitude.vec()) && isFinite(s.positionNed) &&
+           isFinite(s.velocityNed) && isFinite(s.rateBody) && isFinite(r.positionNed) &&
+           isFinite(r.velocityNed) && isFinite(r.accelerationNed) && isFinite(r.yaw) &&
+           isFinite(r.yawRate);
   }
 
   const Gains& gains_;

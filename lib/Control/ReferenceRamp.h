@@ -78,7 +78,7 @@ class ReferenceRamp {
   /// @param positionNed  m
   /// @param yaw  rad, any turn
   void setTarget(const Vector3f& positionNed, float yaw) {
-    if (!isFinite(positionNed) || !(yaw - yaw == 0.0F)) return;
+    if (!isFinite(positionNed) || !isFinite(yaw)) return;
     const float wrapped = wrapAngle(yaw);
     if (positionNed != targetPosition_) {
       targetPosition_ = positionNed;

@@ -10,8 +10,9 @@
 ///   SensorSet begin();                  starts buses and devices; returns those that answered.
 ///                                       Called once by setup(), on the ground; may take seconds.
 ///   bool readImu(ImuRaw&);              true and filled when a reading newer than the last one is
-///   bool readMag(MagRaw&);              there. Never waits for one; the time each may take at
-///   worst bool readAlt(AltRaw&);              is the board's stated bound. bool readGps(GpsRaw&);
+///   bool readMag(MagRaw&);              there. Never waits for one; how long each may take at
+///   bool readAlt(AltRaw&);              worst is the board's stated bound.
+///   bool readGps(GpsRaw&);
 ///   PilotSwitches readPilot();          the pilot's switches as they are now
 ///   void writeEsc(const EscCommands&);  M1..M4 in the vehicle's command unit; takes effect at the
 ///                                       next ESC frame

@@ -28,6 +28,14 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 /// IEEE 754 requires a correctly rounded square root, so the library's is the same everywhere.
 [[nodiscard]] inline float squareRoot(float x) { return std::sqrt(x); }
 
+/// Polynomial in x by Horner's rule, highest power first: polynomial(x, a, b, c) = (a x + b) x + c.
+template <class... Lower>
+[[nodiscard]] constexpr float polynomial(float x, float highest, Lower... lower) {
+  float sum = highest;
+  ((sum = sum * x + lower), ...);
+  return sum;
+}
+
 struct SinCos {
   float sin;
   float cos;
@@ -47,9 +55,9 @@ struct SinCos {
       ((magnitude - y * 0.78515625F) - y * 2.4187564849853515625e-4F) - y * 3.77489497744594108e-8F;
   const float z = r * r;
   const float sine =
-      ((-1.9515295891e-4F * z + 8.3321608736e-3F) * z - 1.6666654611e-1F) * z * r + r;
+      polynomial(z, -1.9515295891e-4F, 8.3321608736e-3F, -1.6666654611e-1F) * z * r + r;
   const float cosine =
-      ((2.443315711809948e-5F * z - 1.388731625493765e-3F) * z + 4.166664568298827e-2F) * z * z -
+      polynomial(z, 2.443315711809948e-5F, -1.388731625493765e-3F, 4.166664568298827e-2F) * z * z -
       0.5F * z + 1.0F;
   SinCos out{sine, cosine};
   switch ((octant >> 1) & 3) {
@@ -85,11 +93,9 @@ struct SinCos {
     t = (magnitude - 1.0F) / (magnitude + 1.0F);
   }
   const float z = t * t;
-  const float angle =
-      offset + ((((8.05374449538e-2F * z - 1.38776856032e-1F) * z + 1.99777106478e-1F) * z -
-                 3.33329491539e-1F) *
-                    z * t +
-                t);
+  const float p =
+      polynomial(z, 8.05374449538e-2F, -1.38776856032e-1F, 1.99777106478e-1F, -3.33329491539e-1F);
+  const float angle = offset + (p * z * t + t);
   return x < 0.0F ? -angle : angle;
 }
 
@@ -111,12 +117,9 @@ struct SinCos {
   const bool nearOne = magnitude > 0.5F;  // there: asin(a) = pi/2 - 2 asin(sqrt((1 - a) / 2))
   const float z = nearOne ? 0.5F * (1.0F - magnitude) : magnitude * magnitude;
   const float t = nearOne ? squareRoot(z) : magnitude;
-  float angle =
-      ((((4.2163199048e-2F * z + 2.4181311049e-2F) * z + 4.5470025998e-2F) * z + 7.4953002686e-2F) *
-           z +
-       1.6666752422e-1F) *
-          z * t +
-      t;
+  const float p = polynomial(z, 4.2163199048e-2F, 2.4181311049e-2F, 4.5470025998e-2F,
+                             7.4953002686e-2F, 1.6666752422e-1F);
+  float angle = p * z * t + t;
   if (nearOne) angle = kHalfPi - 2.0F * angle;
   return x < 0.0F ? -angle : angle;
 }
@@ -146,19 +149,10 @@ struct SinCos {
   }
   const auto e = static_cast<float>(exponent);
   const float z = m * m;
-  float y = ((((((((7.0376836292e-2F * m - 1.1514610310e-1F) * m + 1.1676998740e-1F) * m -
-                  1.2420140846e-1F) *
-                     m +
-                 1.4249322787e-1F) *
-                    m -
-                1.6668057665e-1F) *
-                   m +
-               2.0000714765e-1F) *
-                  m -
-              2.4999993993e-1F) *
-                 m +
-             3.3333331174e-1F) *
-            m * z;
+  const float p = polynomial(m, 7.0376836292e-2F, -1.1514610310e-1F, 1.1676998740e-1F,
+                             -1.2420140846e-1F, 1.4249322787e-1F, -1.6668057665e-1F,
+                             2.0000714765e-1F, -2.4999993993e-1F, 3.3333331174e-1F);
+  float y = p * m * z;
   y += -2.12194440e-4F * e;
   y += -0.5F * z;
   return m + y + 0.693359375F * e;
@@ -174,18 +168,12 @@ struct SinCos {
   if (static_cast<float>(n) > scaled) --n;  // floor
   const auto k = static_cast<float>(n);
   const float r = (x - k * 0.693359375F) - k * -2.12194440e-4F;
-  const float p = (((((1.9875691500e-4F * r + 1.3981999507e-3F) * r + 8.3334519073e-3F) * r +
-                     4.1665795894e-2F) *
-                        r +
-                    1.6666665459e-1F) *
-                       r +
-                   5.0000001201e-1F) *
-                      r * r +
-                  r + 1.0F;
+  const float p = polynomial(r, 1.9875691500e-4F, 1.3981999507e-3F, 8.3334519073e-3F,
+                             4.1665795894e-2F, 1.6666665459e-1F, 5.0000001201e-1F);
   const auto bits = static_cast<std::uint32_t>(n + 127) << 23U;  // 2^n
   float power = 0.0F;
   std::memcpy(&power, &bits, sizeof power);
-  return p * power;
+  return (p * r * r + r + 1.0F) * power;
 }
 
 /// An angle brought into (-pi, pi]. Domain and NaN as sinCos; takes the same time for all.

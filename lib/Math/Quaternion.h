@@ -34,7 +34,7 @@ struct Quaternion {
 /// q scaled to length one. A zero or non-finite quaternion gives the identity.
 [[nodiscard]] inline Quaternion normalized(const Quaternion& q) {
   const float length = norm(q);
-  if (!(length > 0.0F) || !(length - length == 0.0F)) return {};
+  if (!(length > 0.0F) || !isFinite(length)) return {};
   const float s = 1.0F / length;
   return {q.w * s, q.x * s, q.y * s, q.z * s};
 }
@@ -45,8 +45,8 @@ struct Quaternion {
 }
 
 /// Rotation vector to unit quaternion, q = [cos(a/2), sin(a/2) v/a], a = |v|.
-/// Second-order series below 1e-3 rad: its error a^4/384 is under one float ulp. Sola (2017), eq.
-/// 101.
+/// Second-order series below 1e-3 rad: its error a^4/384 is under one float ulp.
+/// Sola (2017), eq. 101.
 /// @param v  rotation vector, rad
 [[nodiscard]] inline Quaternion quaternionExp(const Vector3f& v) {
   const float angle2 = v.squaredNorm();

@@ -20,8 +20,8 @@ class ESKF {
 
   explicit ESKF(const NavigationConfig& config) : config_(config) {}
 
-  /// Starts from rest at the origin with a known attitude. Until then every call below does
-  /// nothing.
+  /// Starts from rest at the origin with a known attitude.
+  /// Until then every call below does nothing.
   /// @param gravity  norm of the specific force at rest, m/s^2
   void initialize(const Alignment& alignment, float gravity);
 
@@ -91,6 +91,9 @@ class ESKF {
   void updateDirection(Innovation& record, const Vector3f& measured, const Vector3f& predicted,
                        float variance);
 
+  /// Time since `last`, at most kMaxPredictStep, s; moves `last` on to `now`.
+  [[nodiscard]] static float secondsSince(Micros& last, Micros now);
+
   NavigationConfig config_;
   VehicleState state_;
   Vector9f error_ = Vector9f::Zero();
@@ -113,6 +116,12 @@ class ESKF {
 /// A longer gap between two samples is taken as this long: the state is then no longer trusted by
 /// its own covariance anyway, and one wild dt must not blow it up.
 constexpr Micros kMaxPredictStep = 200'000;
+
+inline float ESKF::secondsSince(Micros& last, Micros now) {
+  const Micros since = elapsed(now, last);
+  last = now;
+  return toSeconds(since < kMaxPredictStep ? since : kMaxPredictStep);
+}
 
 inline void ESKF::initialize(const Alignment& alignment, float gravity) {
   aligned_ = true;
@@ -146,12 +155,9 @@ inline void ESKF::predict(const Vector3f& accel, const Vector3f& gyro, Micros no
     lastPredict_ = lastMag_ = lastAlt_ = now;
     return;
   }
-  Micros step = elapsed(now, lastPredict_);
-  lastPredict_ = now;
-  if (step > kMaxPredictStep) step = kMaxPredictStep;
-  const float dt = toSeconds(step);
+  const float dt = secondsSince(lastPredict_, now);
   dt_ = dt;  // zero for a sample that comes twice: then there is no second tilt update either
-  if (step == 0) return;
+  if (dt == 0.0F) return;
 
   const Matrix3f nedToBody = q2R(state_.attitude);
   propagateCovariance(nedToBody, accel, gyro, dt);
@@ -234,22 +240,16 @@ inline void ESKF::updateTiltMeas(const Vector3f& accel) {
 
 inline void ESKF::updateMagMeas(const Vector3f& mag, Micros now) {
   mag_.begin();
-  if (!aligned_) return;
-  const Micros since = elapsed(now, lastMag_);
-  lastMag_ = now;
-  if (!started_ || magReference_.isZero(0.0F) || since == 0) return;
-  const float dt = toSeconds(since < kMaxPredictStep ? since : kMaxPredictStep);
+  const float dt = secondsSince(lastMag_, now);
+  if (!started_ || magReference_.isZero(0.0F) || dt == 0.0F) return;
   const Vector3f predicted = rotateToBody(state_.attitude, magReference_);
   updateDirection(mag_, mag, predicted, config_.mag.variance(dt));
 }
 
 inline void ESKF::updateAltMeas(float height, Micros now) {
   alt_.begin();
-  if (!aligned_) return;
-  const Micros since = elapsed(now, lastAlt_);
-  lastAlt_ = now;
-  if (!started_ || since == 0) return;
-  const float dt = toSeconds(since < kMaxPredictStep ? since : kMaxPredictStep);
+  const float dt = secondsSince(lastAlt_, now);
+  if (!started_ || dt == 0.0F) return;
   scalarGPSAltUpdate(alt_, -height - state_.positionNed.z(), kPosition + 2,
                      config_.alt.variance(dt));
 }
@@ -329,7 +329,7 @@ inline bool ESKF::healthy() const {
     if (!(covariance_(i, i) >= 0.0F)) return false;
   }
   return isFinite(covariance_) && isFinite(state_.positionNed) && isFinite(state_.velocityNed) &&
-         state_.attitude.w - state_.attitude.w == 0.0F;
+         isFinite(state_.attitude.w);
 }
 
 }  // namespace strix

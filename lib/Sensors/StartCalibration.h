@@ -60,8 +60,7 @@ class StartCalibration {
 
   /// @param pressure  Pa
   void addPressure(float pressure) {
-    const Vector3f value{pressure, 0.0F, 0.0F};
-    if (!done_ && pressure > 0.0F && isFinite(value)) pressure_.add(value);
+    if (!done_ && pressure > 0.0F && isFinite(pressure)) pressure_.add({pressure, 0.0F, 0.0F});
   }
 
   [[nodiscard]] bool done() const { return done_; }
