@@ -29,6 +29,9 @@ constexpr Micros kGpsDelay = 100'000;
   config.declination = declination;
   config.sensors.mag.sensorToBody = magSensorToBody();
   config.navigation.gpsDelay = kGpsDelay;
+  config.navigation.gpsPositionSigma = 3.0F;  // m and m/s, an MTK3333 under open sky
+  config.navigation.gpsVelocitySigma = 0.3F;
+  config.navigation.accelNoise = 0.05F;
   return config;
 }
 

@@ -1,4 +1,4 @@
-/// Conditions that need time to be believed: touch-down and standstill.
+/// Conditions that need time to be believed.
 #pragma once
 
 #include "Mathpk.h"
@@ -37,10 +37,9 @@ struct TouchDownConfig {
   Micros duration = 400'000;
 };
 
-/// Nothing moves: what arming asks for. Free fall is not rest: the specific force must be g long.
-struct StandstillConfig {
-  float rate = 0.1F;          ///< rad/s
-  float acceleration = 0.5F;  ///< m/s^2, | |a| - g |
+/// Thrust steadily near the weight: the currents are those of hovering.
+struct HoverConfig {
+  float thrustBand = 0.2F;  ///< of the weight, either side
   Micros duration = 500'000;
 };
 

@@ -5,8 +5,8 @@
 #include "Board.h"
 #include "Controller.h"
 #include "DataTypes.h"
-#include "ESKF.h"
 #include "Motors.h"
+#include "Navigation.h"
 #include "Sensors.h"
 
 namespace strix {
@@ -41,12 +41,24 @@ namespace strix {
           innovation.nis, innovation.count, innovation.rejected};
 }
 
-[[nodiscard]] inline topic::EstimatorStd toRecord(LogTime time, const Matrix9f& covariance) {
+template <int States>
+[[nodiscard]] topic::EstimatorStd toStdRecord(LogTime time, const ESKF<States>& filter) {
   topic::EstimatorStd record{time, {}};
-  for (int i = 0; i < 9; ++i) {
-    record.std_dev[static_cast<std::size_t>(i)] = squareRoot(covariance(i, i));
+  for (int i = 0; i < States; ++i) {
+    record.std_dev[static_cast<std::size_t>(i)] = squareRoot(filter.packedCovariance()(i, i));
   }
   return record;
+}
+
+template <int States>
+[[nodiscard]] topic::EstimatorSensorBias toBiasRecord(LogTime time, const ESKF<States>& filter) {
+  return {time, toArray(filter.gyroBias()), toArray(filter.accelBias()), toArray(filter.magBias())};
+}
+
+template <int States>
+[[nodiscard]] topic::EstimatorStatus toRecord(LogTime time, const Navigation<States>& navigation) {
+  return {time, navigation.health(), navigation.restarts(), navigation.readmissions(),
+          navigation.vibration()};
 }
 
 [[nodiscard]] inline GncRecords toRecords(LogTime time, const VehicleState& estimate,

@@ -5,19 +5,20 @@
 #include "Conditions.h"
 #include "Controller.h"
 #include "Detectors.h"
-#include "ESKF.h"
 #include "FiniteStateMachine.h"
 #include "FlightLog.h"
 #include "FlightSoftwareConfig.h"
 #include "Guidance.h"
 #include "Logger.h"
 #include "Motors.h"
+#include "Navigation.h"
 #include "Sensors.h"
 #include "Version.h"
 
 namespace strix {
 
-template <class Board>
+/// @tparam States  of the navigation filter: 18, or 9 without biases
+template <class Board, int States = 18>
 class FlightSoftware {
  public:
   FlightSoftware(Board& board, const FlightSoftwareConfig& config)
@@ -25,13 +26,13 @@ class FlightSoftware {
         config_(config),
         sensors_(board, config.sensors),
         startCalibration_(config.startCalibration),
-        eskf_(config.navigation),
+        navigation_(config.navigation),
         guidance_(config.mission, config.guidance),
         controller_(config.vehicle, config.gains, config.control),
         motors_(config.vehicle),
         logger_(board.card()),
         touchDown_(config.touchDown.duration),
-        standstill_(config.standstill.duration) {}
+        hover_(config.hover.duration) {}
 
   /// Starts the board and the log. Start-up calibration follows in the loop, in state BOOT.
   void setup() {
@@ -43,11 +44,10 @@ class FlightSoftware {
     controller_.reset(now);
     motors_.disarm();
     motors_.writeESC(board_);
-    standstill_.reset(now);
+    hover_.reset(now);
     touchDown_.reset(now);
     entered_ = now;
-    for (PeriodicTask* task : {&standstillUpdate_, &stateLog_, &switchLog_, &stdLog_})
-      task->start(now);
+    for (PeriodicTask* task : {&stateLog_, &switchLog_, &stdLog_, &statusLog_}) task->start(now);
     logger_.begin(time,
                   {config_.vehicle.name, Board::kName, kVersion, kGitCommit, board_.bootId()});
   }
@@ -61,42 +61,40 @@ class FlightSoftware {
       const ImuRaw& raw = sensors_.getIMUMeas();
       const ImuSample imu = sensors_.processIMUMeas(raw);
       startCalibration_.addImu(imu.sampled, imu.accel, imu.gyro);  // until it is done;
-      eskf_.predict(imu.accel, imu.gyro, imu.sampled);             // from then on
-      eskf_.updateTiltMeas(imu.accel);
-      observeStandstill(now, imu);
+      navigation_.predict(imu.accel, imu.gyro, imu.sampled);       // from then on
+      navigation_.updateTiltMeas(imu.accel);
       logger_.logIMU(toRecord(time, clock_.at(raw.sampled), raw));
-      logAid<AidSource::Tilt>(time, eskf_.tiltInnovation());
+      logAid<AidSource::Tilt>(time, estimator().tiltInnovation());
     }
     if (sensors_.magUpdate(now)) {
       const MagRaw& raw = sensors_.getMagMeas();
       const Vector3f field = sensors_.processMagMeas(raw);
       startCalibration_.addMag(field);
-      eskf_.updateMagMeas(field, now);
+      navigation_.updateMagMeas(field, now);
       logger_.logMag(toRecord(time, clock_.at(raw.sampled), raw));
-      logAid<AidSource::Magnetometer>(time, eskf_.magInnovation());
+      logAid<AidSource::Magnetometer>(time, estimator().magInnovation());
     }
     if (sensors_.altUpdate(now)) {
       const AltRaw& raw = sensors_.getAltMeas();
       startCalibration_.addPressure(raw.pressure);
-      eskf_.updateAltMeas(sensors_.processAltMeas(raw), now);
+      navigation_.updateAltMeas(sensors_.processAltMeas(raw), now);
       logger_.logAlt(toRecord(time, clock_.at(raw.sampled), raw));
-      logAid<AidSource::Altimeter>(time, eskf_.altInnovation());
+      logAid<AidSource::Altimeter>(time, estimator().altInnovation());
     }
     if (sensors_.gpsUpdate(now)) {
       const GpsRaw& raw = sensors_.getGPSMeas();
       if (sensors_.gpsUsable(raw)) {
         if (!everArmed_) averageOrigin(raw);
         const GpsSample gps = sensors_.processGPSMeas(raw);
-        eskf_.updateGPSMeas(gps.positionNed, gps.velocityNed);
+        navigation_.updateGPSMeas(gps.positionNed, gps.velocityNed, now);
       }
       logger_.logGPS(toRecord(time, clock_.at(raw.sampled), raw));
-      logAid<AidSource::Gps>(time, eskf_.gpsInnovation());
+      logAid<AidSource::Gps>(time, estimator().gpsInnovation());
     }
-    if (onGround() && standstillUpdate_.run(now)) eskf_.updateStandstill();
-    eskf_.injectError();
-    if (calibrating() && startCalibration_.done()) finishCalibration(time);
+    navigation_.finishPass(now);
+    if (calibrating() && startCalibration_.done()) finishCalibration(now, time);
 
-    const VehicleState estimate = eskf_.state();
+    const VehicleState estimate = navigation_.state();
     updateStateMachine(now, time, estimate);
     const Reference& reference = guidance_.update(now);
     if (controller_.updateControl(now, reference, estimate)) {
@@ -105,14 +103,16 @@ class FlightSoftware {
       controller_.setAchieved(motors_.achieved());
       logger_.logGNC(toRecords(time, estimate, reference, controller_, motors_, tick(now, time)));
     }
-    if (stdLog_.run(now)) logger_.log(toRecord(time, eskf_.covariance()));
+    navigation_.setMotors(motorState(now));
+    logNavigation(now, time);
     logger_.write(time);
     logger_.flush(time);
     lastPass_ = now;
   }
 
   [[nodiscard]] const FiniteStateMachine& stateMachine() const { return fsm_; }
-  [[nodiscard]] const ESKF& estimator() const { return eskf_; }
+  [[nodiscard]] const Navigation<States>& navigation() const { return navigation_; }
+  [[nodiscard]] const ESKF<States>& estimator() const { return navigation_.filter(); }
   [[nodiscard]] const Sensors<Board>& sensors() const { return sensors_; }
   [[nodiscard]] const Motors& motors() const { return motors_; }
   [[nodiscard]] const Controller& controller() const { return controller_; }
@@ -127,18 +127,13 @@ class FlightSoftware {
  private:
   [[nodiscard]] bool calibrating() const { return fsm_.state() == FlightState::Boot; }
 
-  /// Known to stand still: the motors are off and nothing moves.
-  [[nodiscard]] bool onGround() const {
-    return !calibrating() && !motors_.armed() && standstill_.held();
-  }
-
   /// Aligns the filter with what the still aircraft showed.
-  void finishCalibration(LogTime time) {
+  void finishCalibration(Micros now, LogTime time) {
     const StartCalibration& found = startCalibration_;
     const Alignment alignment = alignStill(found.accel(), found.mag(), config_.declination);
     const float gravity = found.accel().norm();
     sensors_.setStartCalibration(found.gyroBias(), found.groundPressure());
-    eskf_.initialize(alignment, gravity);
+    navigation_.initialize(alignment, gravity, now);
     const GeoPoint& origin = sensors_.origin();
     logger_.log(topic::EstimatorStart{
         time, toArray(found.gyroBias()), gravity, toArray(alignment.magReference),
@@ -152,11 +147,14 @@ class FlightSoftware {
     sensors_.setOrigin(origin_.origin());
   }
 
-  void observeStandstill(Micros now, const ImuSample& imu) {
-    const float excess = imu.accel.norm() - kGravity;
-    standstill_.update(now, imu.gyro.norm() < config_.standstill.rate &&
-                                excess < config_.standstill.acceleration &&
-                                excess > -config_.standstill.acceleration);
+  /// What the motors do to magnetometer and accelerometer.
+  [[nodiscard]] MotorState motorState(Micros now) {
+    const float weight = config_.vehicle.mass * kGravity;
+    const float excess = motors_.achieved().thrust / weight - 1.0F;
+    hover_.update(now, motors_.armed() && excess < config_.hover.thrustBand &&
+                           excess > -config_.hover.thrustBand);
+    if (!motors_.armed()) return MotorState::Stopped;
+    return hover_.held() ? MotorState::Hover : MotorState::Disturbed;
   }
 
   void updateStateMachine(Micros now, LogTime time, const VehicleState& estimate) {
@@ -196,9 +194,9 @@ class FlightSoftware {
     refuseIf(!found_.alt || !sensors_.altFresh(now), prearm::kAlt);
     refuseIf(!sensors_.gpsFresh(now) || !sensors_.gpsUsable(sensors_.getGPSMeas()), prearm::kGps);
     refuseIf(origin_.count() < config_.originFixes, prearm::kOrigin);
-    refuseIf(!eskf_.healthy(), prearm::kEstimator);
+    refuseIf((navigation_.health() & health::kNoArming) != 0, prearm::kEstimator);
     refuseIf(!(cosTilt(estimate.attitude) > cosine(config_.armTilt)), prearm::kTilt);
-    refuseIf(!standstill_.held(), prearm::kMoving);
+    refuseIf(!navigation_.standsStill(), prearm::kMoving);
     refuseIf(pilot.kill, prearm::kKillSwitch);
     refuseIf(pilot.start, prearm::kStartSwitch);
     refuseIf(!found_.card || logger_.failed(), prearm::kLog);
@@ -224,7 +222,7 @@ class FlightSoftware {
     setIf(!(cosTilt(estimate.attitude) > 0.0F), condition::kUpset);
     setIf(!config_.fence.contains(estimate.positionNed), condition::kOutsideFence);
     setIf(!sensors_.imuFresh(now), condition::kImuLost);
-    setIf(!eskf_.healthy(), condition::kEstimatorUnhealthy);
+    setIf(!navigation_.healthy(), condition::kEstimatorUnhealthy);
     return set;
   }
 
@@ -247,11 +245,14 @@ class FlightSoftware {
 
   [[nodiscard]] topic::ControlTick tick(Micros now, LogTime time) const {
     StateHash hash;
-    const VehicleState& s = eskf_.state();
+    const VehicleState& s = estimator().state();
     hash.add(s.positionNed);
     hash.add(s.velocityNed);
     for (const float element : toArray(s.attitude)) hash.add(element);
-    hash.add(eskf_.covariance());
+    hash.add(estimator().accelBias());
+    hash.add(estimator().gyroBias());
+    hash.add(estimator().magBias());
+    for (const float element : estimator().packedCovariance().elements()) hash.add(element);
     hash.add(controller_.error());
     hash.add(static_cast<std::uint32_t>(fsm_.state()));
     for (const float command : motors_.commands()) hash.add(command);
@@ -261,6 +262,23 @@ class FlightSoftware {
   template <AidSource Source>
   void logAid(LogTime time, const Innovation& innovation) {
     logger_.template logAid<Source>(toRecord(time, innovation));
+  }
+
+  /// How sure the filter is, and in words what has just gone wrong with it.
+  void logNavigation(Micros now, LogTime time) {
+    if (stdLog_.run(now)) logger_.log(toStdRecord(time, estimator()));
+    if (!statusLog_.run(now)) return;
+    logger_.log(toBiasRecord(time, estimator()));
+    logger_.log(toRecord(time, navigation_));
+    const NavigationHealth begun = navigation_.health() & ~loggedHealth_;
+    loggedHealth_ = navigation_.health();
+    for (const HealthText& text : kHealthTexts) {
+      if ((begun & text.bit) != 0) logger_.logText(ulog::LogLevel::Warning, time, text.said);
+    }
+    if (navigation_.readmissions() == loggedReadmissions_) return;
+    loggedReadmissions_ = navigation_.readmissions();
+    logger_.logText(ulog::LogLevel::Warning, time,
+                    "estimator: takes in again a sensor it had rejected for long");
   }
 
   void logSwitches(Micros now, LogTime time, const PilotSwitches& pilot) {
@@ -277,7 +295,7 @@ class FlightSoftware {
   Sensors<Board> sensors_;
   StartCalibration startCalibration_;
   OriginAverage origin_;
-  ESKF eskf_;
+  Navigation<States> navigation_;
   FiniteStateMachine fsm_;
   Guidance guidance_;
   Controller controller_;
@@ -286,11 +304,13 @@ class FlightSoftware {
   LogClock clock_;
   SensorSet found_;
   Persistence touchDown_;
-  Persistence standstill_;
-  PeriodicTask standstillUpdate_{periodFromHz(10)};
+  Persistence hover_;
   PeriodicTask stateLog_{periodFromHz(10)};
   PeriodicTask switchLog_{periodFromHz(1)};
   PeriodicTask stdLog_{periodFromHz(50)};
+  PeriodicTask statusLog_{periodFromHz(10)};
+  NavigationHealth loggedHealth_ = health::kNone;
+  std::uint32_t loggedReadmissions_ = 0;
   PilotSwitches loggedPilot_;
   Micros entered_ = 0;  ///< when the present state began
   Micros lastPass_ = 0;

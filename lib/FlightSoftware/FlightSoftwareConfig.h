@@ -22,7 +22,7 @@ struct FlightSoftwareConfig {
   ControlLimits control{};
   Fence fence{};
   TouchDownConfig touchDown{};
-  StandstillConfig standstill{};
+  HoverConfig hover{};
   float declination = 0.0F;           ///< rad, east positive: magnetic to true north
   std::uint32_t originFixes = 50;     ///< GPS fixes averaged before arming is allowed
   float armTilt = 20.0F * kDegToRad;  ///< rad, most tilt at arming

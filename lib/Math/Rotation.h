@@ -56,6 +56,12 @@ namespace strix {
   return rotateToNed(conjugate(q), vNed);
 }
 
+/// Down in the body frame: the last column of q2R(q).
+[[nodiscard]] inline Vector3f downInBody(const Quaternion& q) {
+  return {2.0F * (q.x * q.z - q.w * q.y), 2.0F * (q.y * q.z + q.w * q.x),
+          1.0F - 2.0F * (q.x * q.x + q.y * q.y)};
+}
+
 /// Aerospace angles in rad: yaw about down, then pitch about right, then roll about forward.
 struct EulerAngles {
   float roll = 0.0F;   ///< positive: right side down

@@ -1,104 +1,199 @@
-/// Error-state Kalman filter with 9 states (DESIGN.md, 4; Sola, arXiv 1711.02508).
+/// Error-state Kalman filter with 9 or 18 states (DESIGN.md, 4; Sola, arXiv 1711.02508).
 ///
-/// Nominal state: position and velocity (NED), attitude q. Error state dx, in this order:
-/// dp (0..2), dv (3..5), alpha (6..8), with alpha local: q_true = q (x) [1, alpha/2].
+/// Nominal state: position and velocity (NED), attitude q and, with 18 states, the biases of
+/// accelerometer, gyro and magnetometer. ErrorDynamics.h has the error state and how it moves.
 /// Measurements come in as scalars, one after the other; they change dx and P only. injectError()
 /// moves dx into the nominal state, once a loop pass.
 #pragma once
 
 #include "Alignment.h"
+#include "ErrorDynamics.h"
 #include "Innovation.h"
 #include "Mathpk.h"
 #include "NavigationConfig.h"
 
 namespace strix {
 
+[[nodiscard]] constexpr float square(float x) { return x * x; }
+
+template <int States>
 class ESKF {
  public:
-  static constexpr int kStates = 9;
-  enum Block : int { kPosition = 0, kVelocity = 3, kAlpha = 6 };
+  static constexpr int kStates = States;
+  static constexpr bool kBiases = ErrorDynamics<States>::kBiases;
+  using Vector = std::array<float, States>;
+  using Matrix = Eigen::Matrix<float, States, States>;
 
-  explicit ESKF(const NavigationConfig& config) : config_(config) {}
+  explicit ESKF(const NavigationConfig& config);
 
-  /// Starts from rest at the origin with a known attitude.
+  /// Starts from rest at the origin with a known attitude and no bias known.
   /// Until then every call below does nothing.
   /// @param gravity  norm of the specific force at rest, m/s^2
   void initialize(const Alignment& alignment, float gravity);
 
+  /// Begins anew in flight, with a state from elsewhere and little trust in it.
+  void restart(const Quaternion& attitude, const Vector3f& positionNed,
+               const Vector3f& velocityNed);
+
+  /// Power spectral densities from now on.
+  /// @param accel  (m/s^2)^2 / Hz    @param gyro  (rad/s)^2 / Hz
+  void setNoise(float accel, float gyro) {
+    noise_.accel = accel;
+    noise_.gyro = gyro;
+  }
+
   /// Moves the nominal state and the covariance on to `now`. The first call only sets the time.
-  /// @param accel  specific force, m/s^2, body    @param gyro  rad/s, body
+  /// @param accel  measured specific force, m/s^2, body    @param gyro  measured rate, rad/s, body
   void predict(const Vector3f& accel, const Vector3f& gyro, Micros now);
 
   /// Gravity direction, used while the specific force is nearly g long: | |a| - g | < tiltGate.
   /// @param accel  the sample given to predict, m/s^2, body
-  void updateTiltMeas(const Vector3f& accel);
+  /// @param inflation  factor on the variance; zero: not used
+  /// @param extraDensity2  added to the noise's squared density, (m/s^2)^2 / Hz
+  void updateTiltMeas(const Vector3f& accel, float inflation = 1.0F, float extraDensity2 = 0.0F);
 
-  /// Three-axis magnetic field. Like height, not used before the first prediction: until then no
-  /// time is known from which `now` counts.
-  /// @param mag  uT, body
-  void updateMagMeas(const Vector3f& mag, Micros now);
+  /// Magnetic field, as config.magFusion says. Like height, not used before the first prediction:
+  /// until then no time is known from which `now` counts.
+  /// @param mag  uT, body    @param inflation  factor on the variance; zero: not used
+  void updateMagMeas(const Vector3f& mag, Micros now, float inflation = 1.0F);
 
   /// Height above the start, m, up positive.
   void updateAltMeas(float height, Micros now);
 
-  /// GPS fix in the local frame. A fix of age tau measured p - v tau.
+  /// GPS fix in the local frame.
   /// @param positionNed  m; down is not used    @param velocityNed  m/s; down is not used
   void updateGPSMeas(const Vector3f& positionNed, const Vector3f& velocityNed);
 
   /// The aircraft does not move: v = 0, three scalars (ZUPT). Never from a sensor in flight.
   void updateStandstill();
 
+  /// The mean rate measured while the aircraft does not move is the gyro's bias.
+  /// @param meanGyro  rad/s, body    @param sigma  rad/s
+  void updateStandstillRate(const Vector3f& meanGyro, float sigma);
+
   /// Moves dx into the nominal state and clears it. The reset Jacobian I - [alpha/2 x] (Sola,
-  /// eq. 287) is taken as I: alpha is a few mrad a pass.
+  /// eq. 287) is taken into account by the next predict.
   void injectError();
 
-  /// Phi = I + F dt.
-  [[nodiscard]] static Matrix9f getSTM(const Matrix3f& nedToBody, const Vector3f& accel,
-                                       const Vector3f& gyro, float dt);
+  /// One component of a measured direction: h = R ref + b, with H_alpha = row Axis of
+  /// [predicted x] and H_bias = 1 at Bias + Axis.
+  /// @tparam Bias  the block of the bias; none where the filter has none
+  /// @param innovation  z - h(x), without dx
+  template <int Axis, int Bias>
+  void scalarMagTiltUpdate(Innovation& record, float innovation, const Triple& predicted,
+                           float variance);
 
-  /// Q_d = integral over dt of (I + F s) Q_c (I + F s)^T ds, cross terms kept.
-  [[nodiscard]] Matrix9f getQd(const Matrix3f& nedToBody, const Vector3f& accel,
-                               const Vector3f& gyro, float dt) const;
+  /// One scalar that measures one error state directly: H = 1 at Index.
+  template <int Index>
+  void scalarGPSAltUpdate(Innovation& record, float innovation, float variance);
+
+  /// One scalar that is assumed and not measured. It may be wrong for long, so unlike a sensor it
+  /// is never taken in again once the gate rejects it.
+  /// @param keepHeading  its gain gets no part that turns the attitude about the vertical
+  template <int Index>
+  void scalarAssumedUpdate(float innovation, float variance, bool keepHeading);
+
+  /// Phi = I + F dt.
+  [[nodiscard]] static Matrix getSTM(const Matrix3f& nedToBody, const Vector3f& force,
+                                     const Vector3f& rate, float dt) {
+    return dynamics(nedToBody, force, rate, dt).transition();
+  }
+  /// Q_d = integral over dt of (I + F s) Q_c (I + F s)^T ds.
+  [[nodiscard]] Matrix getQd(const Matrix3f& nedToBody, const Vector3f& force, const Vector3f& rate,
+                             float dt) const {
+    return dynamics(nedToBody, force, rate, dt).noise(noise_);
+  }
 
   [[nodiscard]] const VehicleState& state() const { return state_; }
-  [[nodiscard]] const Matrix9f& covariance() const { return covariance_; }
-  [[nodiscard]] const Vector9f& error() const { return error_; }
+  [[nodiscard]] const Vector3f& accelBias() const { return accelBias_; }  ///< m/s^2, body
+  [[nodiscard]] const Vector3f& gyroBias() const { return gyroBias_; }    ///< rad/s, body
+  [[nodiscard]] const Vector3f& magBias() const { return magBias_; }      ///< uT, body
+  [[nodiscard]] const SymmetricMatrix<States>& packedCovariance() const { return p_; }
+  [[nodiscard]] Matrix covariance() const { return p_.dense(); }
+  [[nodiscard]] const Vector& error() const { return dx_; }
   [[nodiscard]] const Vector3f& magReference() const { return magReference_; }
+  [[nodiscard]] float gravity() const { return gravity_; }
+  [[nodiscard]] bool aligned() const { return aligned_; }
   [[nodiscard]] const Innovation& tiltInnovation() const { return tilt_; }
   [[nodiscard]] const Innovation& magInnovation() const { return mag_; }
   [[nodiscard]] const Innovation& altInnovation() const { return alt_; }
   [[nodiscard]] const Innovation& gpsInnovation() const { return gps_; }
 
+  /// The field that R maps to the measured one, uT, NED: what an alignment found, or a new place.
+  void setMagReference(const Vector3f& reference) { magReference_ = reference; }
+
+  /// False for NaN or infinity in position, velocity or attitude: seen right after predict.
+  [[nodiscard]] bool finite() const {
+    const Quaternion& q = state_.attitude;
+    return isFinite(state_.positionNed.sum() + state_.velocityNed.sum() + q.w + q.x + q.y + q.z);
+  }
+
   /// False once a state or a variance is not finite, or a variance is negative.
   [[nodiscard]] bool healthy() const;
 
  private:
-  /// Moves P to Phi P Phi^T + Q_d by 3x3 blocks.
-  void propagateCovariance(const Matrix3f& nedToBody, const Vector3f& accel, const Vector3f& gyro,
-                           float dt);
+  [[nodiscard]] static ErrorDynamics<States> dynamics(const Matrix3f& nedToBody,
+                                                      const Vector3f& force, const Vector3f& rate,
+                                                      float dt) {
+    return {transposedRowsOf(nedToBody), Triple(force), Triple(rate), dt};
+  }
+  STRIX_INLINE void propagateCovariance(const TripleRows& bodyToNed, const Triple& force,
+                                        const Triple& rate, float dt) {
+    ErrorDynamics<States>(bodyToNed, force, rate, dt).propagate(p_, noise_);
+  }
 
-  /// One component of a measured direction: h = R ref, H_alpha = row of [R ref x].
-  void scalarMagTiltUpdate(Innovation& record, float innovation, const Vector3f& row,
-                           float variance);
+  /// No bias known, no correction pending, and these uncertainties.
+  void setCovariance(float positionSigma, float velocitySigma, float tiltSigma, float headingSigma);
 
-  /// One scalar that measures one state directly: H = 1 at `index`.
-  void scalarGPSAltUpdate(Innovation& record, float innovation, int index, float variance);
-
-  /// Common end of both: gate, then dx += K r and P -= K (P H^T)^T.
-  /// @param column  P H^T    @param residual  z - h(x) - H dx
-  void applyScalar(Innovation& record, const Vector9f& column, float residual, float variance);
-
-  void updateDirection(Innovation& record, const Vector3f& measured, const Vector3f& predicted,
+  template <int Bias>
+  void updateDirection(Innovation& record, const Triple& measured, const Triple& predicted,
                        float variance);
+  /// Part of the reference's horizontal field, squared, below which a field has no heading.
+  static constexpr float kLeastField2 = 0.01F;
+  void updateHeading(const Vector3f& mag, float variance);
+  /// Whether updateHeading may move error state i.
+  [[nodiscard]] static constexpr bool headingMoves(int i) {
+    return (i >= kAlpha && i < kAlpha + 3) || (i >= kGyroBias && i < kGyroBias + 3);
+  }
+
+  /// True if the scalar counts. One that failed its gate for too long counts again: `spread` then
+  /// is the variance that something was less sure of than it knew, else zero.
+  [[nodiscard]] STRIX_INLINE bool gate(Innovation& record, float residual, float residualVariance,
+                                       float& spread);
+
+  /// Makes the attitude less sure of a turn about `axis`, length one, by `variance`, rad^2.
+  void spreadAlpha(const Triple& axis, float variance) {
+    unrolled<3>([&](auto i) STRIX_INLINE {
+      unrolled<3>([&](auto j) STRIX_INLINE {
+        if constexpr (i() <= j()) {
+          p_.template element<kAlpha + i(), kAlpha + j()>() += variance * axis.get(i) * axis.get(j);
+        }
+      });
+    });
+  }
+
+  /// dx += K r and P -= K (P H^T)^T.
+  /// @param column  P H^T    @param residual  z - h(x) - H dx    @param residualVariance  H P H^T +
+  /// R
+  void applyScalar(const Vector& column, float residual, float residualVariance);
+
+  /// Column Index of P.
+  template <int Index>
+  [[nodiscard]] Vector column() const;
 
   /// Time since `last`, at most kMaxPredictStep, s; moves `last` on to `now`.
   [[nodiscard]] static float secondsSince(Micros& last, Micros now);
 
-  NavigationConfig config_;
+  // What every call touches comes first: one address reaches it.
+  SymmetricMatrix<States> p_;
+  Vector dx_{};
   VehicleState state_;
-  Vector9f error_ = Vector9f::Zero();
-  Matrix9f covariance_ = Matrix9f::Zero();
+  Triple reset_;  ///< rad, body: half of what was injected since the last prediction
+  Vector3f accelBias_ = Vector3f::Zero();
+  Vector3f gyroBias_ = Vector3f::Zero();
+  Vector3f magBias_ = Vector3f::Zero();
   Vector3f magReference_ = Vector3f::Zero();
+  ProcessNoise noise_;
   Innovation tilt_;
   Innovation mag_;
   Innovation alt_;
@@ -106,230 +201,390 @@ class ESKF {
   Innovation standstill_;
   float gravity_ = kGravity;
   float dt_ = 0.0F;  ///< s, of the last prediction
-  Micros lastPredict_ = 0;
+  Micros now_ = 0;   ///< of the last prediction
   Micros lastMag_ = 0;
   Micros lastAlt_ = 0;
   bool aligned_ = false;
   bool started_ = false;  ///< has predicted since
+  NavigationConfig config_;
 };
 
 /// A longer gap between two samples is taken as this long: the state is then no longer trusted by
 /// its own covariance anyway, and one wild dt must not blow it up.
 constexpr Micros kMaxPredictStep = 200'000;
 
-inline float ESKF::secondsSince(Micros& last, Micros now) {
+template <int States>
+ESKF<States>::ESKF(const NavigationConfig& config)
+    : noise_{square(config.accelNoise), square(config.gyroNoise), square(config.accelBiasWalk),
+             square(config.gyroBiasWalk), square(config.magBiasWalk)},
+      config_(config) {}
+
+template <int States>
+float ESKF<States>::secondsSince(Micros& last, Micros now) {
   const Micros since = elapsed(now, last);
   last = now;
   return toSeconds(since < kMaxPredictStep ? since : kMaxPredictStep);
 }
 
-inline void ESKF::initialize(const Alignment& alignment, float gravity) {
+template <int States>
+void ESKF<States>::initialize(const Alignment& alignment, float gravity) {
   aligned_ = true;
+  started_ = false;
   state_ = VehicleState{};
   state_.attitude = alignment.attitude;
   magReference_ = alignment.magReference;
   gravity_ = gravity;
-  error_.setZero();
-  covariance_.setZero();
-  // The uncertainty of heading is about the vertical, so alpha's block is rotated into the body.
-  const Vector3f down = rotateToBody(state_.attitude, Vector3f{0.0F, 0.0F, 1.0F});
-  const auto square = [](float x) { return x * x; };
-  const float tilt = square(config_.tiltSigma0);
-  const float heading = square(config_.headingSigma0);
-  covariance_.block<3, 3>(kPosition, kPosition)
-      .diagonal()
-      .setConstant(square(config_.positionSigma0));
-  covariance_.block<3, 3>(kVelocity, kVelocity)
-      .diagonal()
-      .setConstant(square(config_.velocitySigma0));
-  covariance_.block<3, 3>(kAlpha, kAlpha) =
-      tilt * Matrix3f::Identity() + (heading - tilt) * down * down.transpose();
-  started_ = false;
+  setCovariance(config_.positionSigma0, config_.velocitySigma0, config_.tiltSigma0,
+                config_.headingSigma0);
 }
 
-inline void ESKF::predict(const Vector3f& accel, const Vector3f& gyro, Micros now) {
+template <int States>
+void ESKF<States>::restart(const Quaternion& attitude, const Vector3f& positionNed,
+                           const Vector3f& velocityNed) {
+  state_.attitude = attitude;
+  state_.positionNed = positionNed;
+  state_.velocityNed = velocityNed;
+  constexpr float kPositionSigma = 10.0F;  // m
+  constexpr float kVelocitySigma = 3.0F;   // m/s
+  constexpr float kTiltSigma = 0.05F;      // rad: wider, and the first fixes would tilt it
+  constexpr float kHeadingSigma = 0.2F;    // rad
+  setCovariance(kPositionSigma, kVelocitySigma, kTiltSigma, kHeadingSigma);
+}
+
+template <int States>
+void ESKF<States>::setCovariance(float positionSigma, float velocitySigma, float tiltSigma,
+                                 float headingSigma) {
+  accelBias_.setZero();
+  gyroBias_.setZero();
+  magBias_.setZero();
+  dx_.fill(0.0F);
+  reset_ = Triple{};
+  // The uncertainty of heading is about the vertical, so alpha's block is rotated into the body.
+  const Vector3f down = downInBody(state_.attitude);
+  const float tilt = square(tiltSigma);
+  Matrix p = Matrix::Zero();
+  const auto set = [&p](int block, float sigma) {
+    p.diagonal().template segment<3>(block).setConstant(square(sigma));
+  };
+  set(kPosition, positionSigma);
+  set(kVelocity, velocitySigma);
+  p.template block<3, 3>(kAlpha, kAlpha) =
+      tilt * Matrix3f::Identity() + (square(headingSigma) - tilt) * down * down.transpose();
+  if constexpr (kBiases) {
+    set(kAccelBias, config_.accelBiasSigma0);
+    set(kGyroBias, config_.gyroBiasSigma0);
+    set(kMagBias, config_.magBiasSigma0);
+  }
+  p_.set(p);
+}
+
+template <int States>
+void ESKF<States>::predict(const Vector3f& accel, const Vector3f& gyro, Micros now) {
   if (!aligned_) return;
-  state_.rateBody = gyro;
+  const Triple force = Triple(accel) - Triple(accelBias_);
+  const Triple rate = Triple(gyro) - Triple(gyroBias_);
+  state_.rateBody = rate.vector();
   if (!started_) {
     started_ = true;
-    lastPredict_ = lastMag_ = lastAlt_ = now;
+    now_ = lastMag_ = lastAlt_ = now;
     return;
   }
-  const float dt = secondsSince(lastPredict_, now);
+  const float dt = secondsSince(now_, now);
   dt_ = dt;  // zero for a sample that comes twice: then there is no second tilt update either
   if (dt == 0.0F) return;
 
-  const Matrix3f nedToBody = q2R(state_.attitude);
-  propagateCovariance(nedToBody, accel, gyro, dt);
-
-  const Vector3f acceleration = nedToBody.transpose() * accel + Vector3f{0.0F, 0.0F, gravity_};
-  state_.positionNed += state_.velocityNed * dt + acceleration * (0.5F * dt * dt);
-  state_.velocityNed += acceleration * dt;
-  state_.attitude = normalized(state_.attitude * quaternionExp(gyro * dt));
+  const TripleRows bodyToNed = transposedRowsOf(q2R(state_.attitude));
+  const Triple acceleration = bodyToNed * force + Triple{0.0F, 0.0F, gravity_};
+  const Triple velocity(state_.velocityNed);
+  state_.positionNed += (dt * velocity + (0.5F * dt * dt) * acceleration).vector();
+  state_.velocityNed += (dt * acceleration).vector();
+  state_.attitude = renormalized(state_.attitude * quaternionExp((dt * rate).vector()));
+  // Injecting alpha turned the frame that alpha lives in, by alpha/2 (Sola, eq. 287): a turn that
+  // P takes now, with that of the gyro.
+  propagateCovariance(bodyToNed, force, rate + (1.0F / dt) * reset_, dt);
+  reset_ = Triple{};
 }
 
-inline Matrix9f ESKF::getSTM(const Matrix3f& nedToBody, const Vector3f& accel, const Vector3f& gyro,
-                             float dt) {
-  Matrix9f phi = Matrix9f::Identity();
-  phi.block<3, 3>(kPosition, kVelocity).diagonal().setConstant(dt);
-  phi.block<3, 3>(kVelocity, kAlpha) = -dt * (nedToBody.transpose() * skew(accel));
-  phi.block<3, 3>(kAlpha, kAlpha) -= dt * skew(gyro);
-  return phi;
+template <int States>
+void ESKF<States>::updateTiltMeas(const Vector3f& accel, float inflation, float extraDensity2) {
+  tilt_.begin();
+  const float excess = accel.norm() - gravity_;
+  if (dt_ == 0.0F || inflation == 0.0F ||
+      !(excess < config_.tiltGate && excess > -config_.tiltGate))
+    return;
+  updateDirection<kAccelBias>(tilt_, Triple(accel) - Triple(accelBias_),
+                              -gravity_ * Triple(downInBody(state_.attitude)),
+                              inflation * (config_.tilt.variance(dt_) + extraDensity2 / dt_));
 }
 
-inline Matrix9f ESKF::getQd(const Matrix3f& nedToBody, const Vector3f& accel, const Vector3f& gyro,
-                            float dt) const {
-  const float qa = config_.accelNoise * config_.accelNoise;
-  const float qg = config_.gyroNoise * config_.gyroNoise;
-  const float dt2 = dt * dt / 2.0F;
-  const float dt3 = dt * dt * dt / 3.0F;
-  const Matrix3f identity = Matrix3f::Identity();
-  const Matrix3f a = -(nedToBody.transpose() * skew(accel));  // F(dv, alpha)
-  const Matrix3f w = skew(gyro);                              // -F(alpha, alpha)
-
-  Matrix9f q = Matrix9f::Zero();
-  q.block<3, 3>(kPosition, kPosition) = qa * dt3 * identity;
-  q.block<3, 3>(kPosition, kVelocity) = qa * dt2 * identity;
-  q.block<3, 3>(kVelocity, kPosition) = qa * dt2 * identity;
-  q.block<3, 3>(kVelocity, kVelocity) = qa * dt * identity + qg * dt3 * (a * a.transpose());
-  q.block<3, 3>(kVelocity, kAlpha) = qg * (dt2 * a + dt3 * (a * w));
-  q.block<3, 3>(kAlpha, kVelocity) = q.block<3, 3>(kVelocity, kAlpha).transpose();
-  q.block<3, 3>(kAlpha, kAlpha) = qg * (dt * identity - dt3 * (w * w));
-  return q;
-}
-
-inline void ESKF::propagateCovariance(const Matrix3f& nedToBody, const Vector3f& accel,
-                                      const Vector3f& gyro, float dt) {
-  // Phi = [I  dt I  0;  0  I  A;  0  0  B]: the same blocks as getSTM.
-  const Matrix3f a = -dt * (nedToBody.transpose() * skew(accel));
-  const Matrix3f b = Matrix3f::Identity() - dt * skew(gyro);
-  Matrix9f& p = covariance_;
-  const auto block = [&p](int row, int column) { return p.block<3, 3>(row, column); };
-
-  // T = Phi P, the blocks that P' needs.
-  const Matrix3f tpp = block(kPosition, kPosition) + dt * block(kVelocity, kPosition);
-  const Matrix3f tpv = block(kPosition, kVelocity) + dt * block(kVelocity, kVelocity);
-  const Matrix3f tpa = block(kPosition, kAlpha) + dt * block(kVelocity, kAlpha);
-  const Matrix3f tvv = block(kVelocity, kVelocity) + a * block(kAlpha, kVelocity);
-  const Matrix3f tva = block(kVelocity, kAlpha) + a * block(kAlpha, kAlpha);
-  const Matrix3f taa = b * block(kAlpha, kAlpha);
-
-  // P' = T Phi^T + Q_d, upper blocks.
-  block(kPosition, kPosition) = tpp + dt * tpv;
-  block(kPosition, kVelocity) = tpv + tpa * a.transpose();
-  block(kPosition, kAlpha) = tpa * b.transpose();
-  block(kVelocity, kVelocity) = tvv + tva * a.transpose();
-  block(kVelocity, kAlpha) = tva * b.transpose();
-  block(kAlpha, kAlpha) = taa * b.transpose();
-  p += getQd(nedToBody, accel, gyro, dt);
-
-  // One triangle is the truth and the other its mirror: rounding cannot make P asymmetric, which
-  // is what costs a float32 filter its positive definiteness within minutes.
-  for (int row = 0; row < kStates; ++row) {
-    for (int column = row + 1; column < kStates; ++column) p(column, row) = p(row, column);
+template <int States>
+void ESKF<States>::updateMagMeas(const Vector3f& mag, Micros now, float inflation) {
+  mag_.begin();
+  const float dt = secondsSince(lastMag_, now);
+  if (!started_ || inflation == 0.0F || magReference_.isZero(0.0F) || dt == 0.0F) return;
+  if (config_.magFusion == MagFusion::HeadingOnly) {
+    updateHeading(mag - magBias_, inflation * config_.heading.variance(dt));
+  } else {
+    updateDirection<kMagBias>(mag_, Triple(mag) - Triple(magBias_),
+                              Triple(rotateToBody(state_.attitude, magReference_)),
+                              inflation * config_.mag.variance(dt));
   }
 }
 
-inline void ESKF::updateTiltMeas(const Vector3f& accel) {
-  tilt_.begin();
-  const float excess = accel.norm() - gravity_;
-  if (dt_ == 0.0F || !(excess < config_.tiltGate && excess > -config_.tiltGate)) return;
-  const Vector3f predicted = rotateToBody(state_.attitude, Vector3f{0.0F, 0.0F, -gravity_});
-  updateDirection(tilt_, accel, predicted, config_.tilt.variance(dt_));
-}
-
-inline void ESKF::updateMagMeas(const Vector3f& mag, Micros now) {
-  mag_.begin();
-  const float dt = secondsSince(lastMag_, now);
-  if (!started_ || magReference_.isZero(0.0F) || dt == 0.0F) return;
-  const Vector3f predicted = rotateToBody(state_.attitude, magReference_);
-  updateDirection(mag_, mag, predicted, config_.mag.variance(dt));
-}
-
-inline void ESKF::updateAltMeas(float height, Micros now) {
+template <int States>
+void ESKF<States>::updateAltMeas(float height, Micros now) {
   alt_.begin();
   const float dt = secondsSince(lastAlt_, now);
   if (!started_ || dt == 0.0F) return;
-  scalarGPSAltUpdate(alt_, -height - state_.positionNed.z(), kPosition + 2,
-                     config_.alt.variance(dt));
+  scalarGPSAltUpdate<kPosition + 2>(alt_, -height - state_.positionNed.z(),
+                                    config_.alt.variance(dt));
 }
 
-inline void ESKF::updateGPSMeas(const Vector3f& positionNed, const Vector3f& velocityNed) {
+template <int States>
+void ESKF<States>::updateGPSMeas(const Vector3f& positionNed, const Vector3f& velocityNed) {
   gps_.begin();
   if (!aligned_) return;
-  const float age = toSeconds(config_.gpsDelay);
-  const float rp = config_.gpsPositionSigma * config_.gpsPositionSigma;
-  const float rv = config_.gpsVelocitySigma * config_.gpsVelocitySigma;
-  for (int axis = 0; axis < 2; ++axis) {
-    const float expected = state_.positionNed(axis) - age * state_.velocityNed(axis);
-    scalarGPSAltUpdate(gps_, positionNed(axis) - expected, kPosition + axis, rp);
-  }
-  for (int axis = 0; axis < 2; ++axis) {
-    scalarGPSAltUpdate(gps_, velocityNed(axis) - state_.velocityNed(axis), kVelocity + axis, rv);
-  }
+  const float rp = square(config_.gpsPositionSigma);
+  const float rv = square(config_.gpsVelocitySigma);
+  const Vector3f position = positionNed - state_.positionNed;
+  const Vector3f velocity = velocityNed - state_.velocityNed;
+  scalarGPSAltUpdate<kPosition + 0>(gps_, position.x(), rp);
+  scalarGPSAltUpdate<kPosition + 1>(gps_, position.y(), rp);
+  scalarGPSAltUpdate<kVelocity + 0>(gps_, velocity.x(), rv);
+  scalarGPSAltUpdate<kVelocity + 1>(gps_, velocity.y(), rv);
 }
 
-inline void ESKF::updateStandstill() {
+template <int States>
+void ESKF<States>::updateStandstill() {
   standstill_.begin();
   if (!aligned_) return;
-  const float variance = config_.standstillSigma * config_.standstillSigma;
-  for (int axis = 0; axis < 3; ++axis) {
-    scalarGPSAltUpdate(standstill_, -state_.velocityNed(axis), kVelocity + axis, variance);
+  const float variance = square(config_.standstillSigma);
+  scalarGPSAltUpdate<kVelocity + 0>(standstill_, -state_.velocityNed.x(), variance);
+  scalarGPSAltUpdate<kVelocity + 1>(standstill_, -state_.velocityNed.y(), variance);
+  scalarGPSAltUpdate<kVelocity + 2>(standstill_, -state_.velocityNed.z(), variance);
+}
+
+template <int States>
+void ESKF<States>::updateStandstillRate(const Vector3f& meanGyro, float sigma) {
+  if constexpr (kBiases) {
+    standstill_.begin();
+    if (!aligned_) return;
+    const Vector3f innovation = meanGyro - gyroBias_;
+    scalarGPSAltUpdate<kGyroBias + 0>(standstill_, innovation.x(), square(sigma));
+    scalarGPSAltUpdate<kGyroBias + 1>(standstill_, innovation.y(), square(sigma));
+    scalarGPSAltUpdate<kGyroBias + 2>(standstill_, innovation.z(), square(sigma));
   }
 }
 
-inline void ESKF::updateDirection(Innovation& record, const Vector3f& measured,
-                                  const Vector3f& predicted, float variance) {
-  const Matrix3f h = skew(predicted);
-  for (int axis = 0; axis < 3; ++axis) {
-    scalarMagTiltUpdate(record, measured(axis) - predicted(axis), h.row(axis).transpose(),
-                        variance);
+template <int States>
+template <int Bias>
+void ESKF<States>::updateDirection(Innovation& record, const Triple& measured,
+                                   const Triple& predicted, float variance) {
+  const Triple innovation = measured - predicted;
+  scalarMagTiltUpdate<0, Bias>(record, innovation.x, predicted, variance);
+  scalarMagTiltUpdate<1, Bias>(record, innovation.y, predicted, variance);
+  scalarMagTiltUpdate<2, Bias>(record, innovation.z, predicted, variance);
+}
+
+template <int States>
+template <int Axis, int Bias>
+void ESKF<States>::scalarMagTiltUpdate(Innovation& record, float innovation,
+                                       const Triple& predicted, float variance) {
+  // Row Axis of [a x] is -a_k at j and a_j at k, with (Axis, j, k) in cyclic order.
+  constexpr int kJ = (Axis + 1) % 3;
+  constexpr int kK = (Axis + 2) % 3;
+  const float hj = -predicted.get(kK);
+  const float hk = predicted.get(kJ);
+  Vector column;  // P H^T
+  unrolled<States>([&](auto row) STRIX_INLINE {
+    float sum = hj * p_.template element<row(), kAlpha + kJ>() +
+                hk * p_.template element<row(), kAlpha + kK>();
+    if constexpr (kBiases) sum += p_.template element<row(), Bias + Axis>();
+    column[row] = sum;
+  });
+  float residual = innovation - hj * dx_[kAlpha + kJ] - hk * dx_[kAlpha + kK];
+  float expected = hj * column[kAlpha + kJ] + hk * column[kAlpha + kK];  // H P H^T
+  if constexpr (kBiases) {
+    residual -= dx_[Bias + Axis];
+    expected += column[Bias + Axis];
   }
-}
-
-inline void ESKF::scalarMagTiltUpdate(Innovation& record, float innovation, const Vector3f& row,
-                                      float variance) {
-  const Vector9f column = covariance_.block<kStates, 3>(0, kAlpha) * row;
-  const float residual = innovation - row.dot(error_.segment<3>(kAlpha));
-  const float s = row.dot(column.segment<3>(kAlpha)) + variance;
-  applyScalar(record, column, residual, s);
-}
-
-inline void ESKF::scalarGPSAltUpdate(Innovation& record, float innovation, int index,
-                                     float variance) {
-  const Vector9f column = covariance_.col(index);
-  applyScalar(record, column, innovation - error_(index), column(index) + variance);
-}
-
-inline void ESKF::applyScalar(Innovation& record, const Vector9f& column, float residual,
-                              float residualVariance) {
-  const float nis = residual * residual / residualVariance;
-  const bool accept = nis <= config_.nisGate;  // false for NaN: nothing spreads
-  record.add(residual, residualVariance, nis, accept);
-  if (!accept) return;
-  const Vector9f gain = column / residualVariance;
-  error_ += gain * residual;
-  for (int row = 0; row < kStates; ++row) {
-    for (int col = row; col < kStates; ++col) {
-      covariance_(row, col) -= gain(row) * column(col);
-      covariance_(col, row) = covariance_(row, col);
+  // A direction that is taken in again is believed little: one axis of it, given to a wide-open
+  // attitude, would tip that over.
+  float spread = 0.0F;
+  if (!gate(record, residual, expected + variance, spread)) return;
+  if constexpr (Bias == kMagBias) {
+    // But a heading may be wrong, as nothing else holds it: where a turn about the vertical, of at
+    // most half a turn, explains the residual, the filter gets that unsure of it.
+    if (spread > 0.0F) {
+      const Triple d(downInBody(state_.attitude));
+      const float hd = hj * d.get(kJ) + hk * d.get(kK);
+      if (spread < square(kPi * hd)) {
+        spreadAlpha(d, spread / square(hd));
+        unrolled<3>([&](auto i) STRIX_INLINE { column[kAlpha + i()] += spread / hd * d.get(i); });
+      }
     }
   }
+  applyScalar(column, residual, expected + variance + spread);
 }
 
-inline void ESKF::injectError() {
-  state_.positionNed += error_.segment<3>(kPosition);
-  state_.velocityNed += error_.segment<3>(kVelocity);
-  state_.attitude = injectRight(state_.attitude, error_.segment<3>(kAlpha));
-  error_.setZero();
+template <int States>
+template <int Index>
+void ESKF<States>::scalarGPSAltUpdate(Innovation& record, float innovation, float variance) {
+  const float residual = innovation - dx_[Index];
+  const float residualVariance = p_.template element<Index, Index>() + variance;
+  float spread = 0.0F;
+  if (!gate(record, residual, residualVariance, spread)) return;
+  p_.template element<Index, Index>() += spread;
+  applyScalar(column<Index>(), residual, residualVariance + spread);
 }
 
-inline bool ESKF::healthy() const {
-  for (int i = 0; i < kStates; ++i) {
-    if (!(covariance_(i, i) >= 0.0F)) return false;
+/// The usual gain K = c/S, c = P H^T, but for its part e = d (d . K_alpha) about the vertical, d
+/// down in the body: K - e. Joseph's form P - (K-e) c^T - c (K-e)^T + S (K-e)(K-e)^T is then the
+/// usual P - c c^T/S with S e e^T given back.
+template <int States>
+template <int Index>
+void ESKF<States>::scalarAssumedUpdate(float innovation, float variance, bool keepHeading) {
+  const float residual = innovation - dx_[Index];
+  const float s = p_.template element<Index, Index>() + variance;
+  if (!(square(residual) <= config_.nisGate * s)) return;
+  const Vector c = column<Index>();
+  applyScalar(c, residual, s);
+  if (!keepHeading) return;
+  const Triple d(downInBody(state_.attitude));
+  const Triple e = (dot(d, {c[kAlpha], c[kAlpha + 1], c[kAlpha + 2]}) / s) * d;
+  unrolled<3>([&](auto i) STRIX_INLINE {
+    dx_[kAlpha + i()] -= e.get(i) * residual;
+    unrolled<3>([&](auto j) STRIX_INLINE {
+      if constexpr (i() <= j()) {
+        p_.template element<kAlpha + i(), kAlpha + j()>() += s * e.get(i) * e.get(j);
+      }
+    });
+  });
+}
+
+template <int States>
+template <int Index>
+auto ESKF<States>::column() const -> Vector {
+  Vector column;
+  unrolled<States>([&](auto row)
+                       STRIX_INLINE { column[row] = p_.template element<row(), Index>(); });
+  return column;
+}
+
+/// Heading alone: how far the measured field, seen level, points from the reference's heading. The
+/// gain is projected on the vertical, K_alpha = d (d . P d)/S with d down in the body, the gyro
+/// bias's likewise, and zero else: no field can tilt the attitude, now or later. P stays a
+/// covariance with any gain when P' = P - K c^T - c K^T + S K K^T, c = P H^T (Joseph's form).
+template <int States>
+void ESKF<States>::updateHeading(const Vector3f& mag, float variance) {
+  const Matrix3f nedToBody = q2R(state_.attitude);
+  const Vector3f down = nedToBody.col(2);
+  const Vector3f level = nedToBody.transpose() * mag;
+  const Vector3f& ref = magReference_;
+  const float horizontal2 = square(ref.x()) + square(ref.y());
+  if (!(square(level.x()) + square(level.y()) > kLeastField2 * horizontal2)) return;
+  const float innovation = arcTangent2(level.x() * ref.y() - level.y() * ref.x(),
+                                       level.x() * ref.x() + level.y() * ref.y());
+  const Triple d(down);
+  // A tilt error turns part of the vertical field into the horizontal one, as the reference goes.
+  const Vector3f row{-ref.x() * ref.z() / horizontal2, -ref.y() * ref.z() / horizontal2, 1.0F};
+  const Triple h(Vector3f(nedToBody * row));
+  const Vector3f biasRow{ref.y() / horizontal2, -ref.x() / horizontal2, 0.0F};
+  const Triple hBias(Vector3f(nedToBody * biasRow));
+  const auto times = [&](const Vector& x) STRIX_INLINE {  // H x
+    float sum = dot(h, {x[kAlpha], x[kAlpha + 1], x[kAlpha + 2]});
+    if constexpr (kBiases) sum += dot(hBias, {x[kMagBias], x[kMagBias + 1], x[kMagBias + 2]});
+    return sum;
+  };
+  Vector c;
+  unrolled<States>([&](auto i) STRIX_INLINE {
+    c[i] = dot(h, p_.template triple<kAlpha, i()>());
+    if constexpr (kBiases) c[i] += dot(hBias, p_.template triple<kMagBias, i()>());
+  });
+  const float residual = innovation - times(dx_);
+  const float expected = times(c);
+  float spread = 0.0F;
+  if (!gate(mag_, residual, expected + variance, spread)) return;
+  if (spread > 0.0F) {  // about the vertical
+    unrolled<3>([&](auto i) STRIX_INLINE { c[kAlpha + i()] += spread * d.get(i); });
+    spreadAlpha(d, spread);
   }
-  return isFinite(covariance_) && isFinite(state_.positionNed) && isFinite(state_.velocityNed) &&
-         isFinite(state_.attitude.w);
+  const float s = expected + variance + spread;
+  // The part of K = c/S about the vertical, of the attitude and of the gyro's bias.
+  Vector gain{};
+  const auto keepVertical = [&](auto block) STRIX_INLINE {
+    constexpr int kBlock = block;
+    const float vertical = dot(d, {c[kBlock], c[kBlock + 1], c[kBlock + 2]}) / s;
+    unrolled<3>([&](auto i) STRIX_INLINE { gain[kBlock + i()] = vertical * d.get(i); });
+  };
+  keepVertical(std::integral_constant<int, kAlpha>{});
+  if constexpr (kBiases) keepVertical(std::integral_constant<int, kGyroBias>{});
+  unrolled<States>([&](auto i) STRIX_INLINE {
+    constexpr bool kRow = headingMoves(i());
+    if constexpr (kRow) dx_[i()] += gain[i()] * residual;
+    unrolled<States>([&](auto j) STRIX_INLINE {
+      constexpr bool kColumn = headingMoves(j());
+      if constexpr (i() <= j() && (kRow || kColumn)) {
+        float& p = p_.template element<i(), j()>();
+        if constexpr (kRow) p -= gain[i()] * c[j()];
+        if constexpr (kColumn) p -= c[i()] * gain[j()];
+        if constexpr (kRow && kColumn) p += s * gain[i()] * gain[j()];
+      }
+    });
+  });
+}
+
+template <int States>
+inline bool ESKF<States>::gate(Innovation& record, float residual, float residualVariance,
+                               float& spread) {
+  const float nis = residual * residual / residualVariance;
+  if (nis <= config_.nisGate) {  // false for NaN: nothing spreads
+    record.accept(residual, residualVariance, nis);
+    return true;
+  }
+  const Micros patience = isFinite(nis) ? config_.readmitAfter : 0;
+  const bool again = record.reject(residual, residualVariance, nis, now_, patience);
+  if (again) spread = square(residual);
+  return again;
+}
+
+template <int States>
+void ESKF<States>::applyScalar(const Vector& column, float residual, float residualVariance) {
+  const float inverse = 1.0F / residualVariance;
+  const float scaled = residual * inverse;
+  unrolled<States>([&](auto i) STRIX_INLINE { dx_[i] += column[i] * scaled; });
+  p_.subtractSquare(inverse, column);
+}
+
+template <int States>
+void ESKF<States>::injectError() {
+  const auto triple = [this](int block) {
+    const auto i = static_cast<std::size_t>(block);
+    return Vector3f{dx_[i], dx_[i + 1], dx_[i + 2]};
+  };
+  state_.positionNed += triple(kPosition);
+  state_.velocityNed += triple(kVelocity);
+  state_.attitude = injectRight(state_.attitude, triple(kAlpha));
+  reset_ = reset_ + 0.5F * Triple(triple(kAlpha));
+  if constexpr (kBiases) {
+    accelBias_ += triple(kAccelBias);
+    gyroBias_ += triple(kGyroBias);
+    magBias_ += triple(kMagBias);
+  }
+  dx_.fill(0.0F);
+}
+
+template <int States>
+bool ESKF<States>::healthy() const {
+  for (int i = 0; i < States; ++i) {
+    if (!(p_(i, i) >= 0.0F)) return false;
+  }
+  for (const float element : p_.elements()) {
+    if (!isFinite(element)) return false;
+  }
+  return isFinite(state_.positionNed) && isFinite(state_.velocityNed) &&
+         isFinite(state_.attitude.w) && isFinite(accelBias_) && isFinite(gyroBias_) &&
+         isFinite(magBias_);
 }
 
 }  // namespace strix

@@ -2,3 +2,4 @@
 
 void runControllerTests();
 void runReferenceRampTests();
+void runGainVectorTests();

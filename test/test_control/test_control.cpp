@@ -9,6 +9,7 @@ int main() {
   UNITY_BEGIN();
   runControllerTests();
   runReferenceRampTests();
+  runGainVectorTests();
   UNITY_END();
   return 0;
 }

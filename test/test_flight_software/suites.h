@@ -6,4 +6,5 @@ void runMotorsOffTests();
 void runLoopTests();
 void runBadInputTests();
 void runMissionTests();
+void runNavigationUseTests();
 void runHeapTests();

@@ -12,6 +12,7 @@ int main() {
   runLoopTests();
   runBadInputTests();
   runMissionTests();
+  runNavigationUseTests();
   runHeapTests();
   UNITY_END();
   return 0;

@@ -229,7 +229,7 @@ void test_safe_is_left_only_by_arming_anew_on_the_ground() {
   TEST_ASSERT_FALSE(flight.arm());
   TEST_ASSERT_TRUE(flight.logSays(firstRefusal(prearm::kMoving)));
   flight.board.hold(Quaternion{});
-  flight.run(1.0F);
+  flight.run(3.0F);
   TEST_ASSERT_TRUE(flight.arm());
   TEST_ASSERT_FALSE(flight.software.stateMachine().getCriticalErrorFlag());
 }

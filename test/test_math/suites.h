@@ -4,4 +4,5 @@
 void runDeterministicTests();
 void runQuaternionTests();
 void runRotationTests();
+void runSymmetricMatrixTests();
 void runTimeTests();

@@ -10,6 +10,7 @@ int main() {
   runDeterministicTests();
   runQuaternionTests();
   runRotationTests();
+  runSymmetricMatrixTests();
   runTimeTests();
   UNITY_END();
   return 0;

@@ -11,6 +11,8 @@
 
 using namespace strix;
 
+void runMotorVectorTests();  // test_motor_vectors.cpp
+
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -372,6 +374,7 @@ int main() {
   RUN_TEST(test_the_weight_is_carried_at_hover);
   RUN_TEST(test_the_achieved_wrench_is_what_the_commands_give);
   RUN_TEST(test_the_closed_form_holds_for_every_airframe);
+  runMotorVectorTests();
   UNITY_END();
   return 0;
 }

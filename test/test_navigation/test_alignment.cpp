@@ -24,6 +24,7 @@ void test_alignment_recovers_any_attitude_from_gravity_and_field() {
   }
 }
 
+template <int States>
 void test_declination_turns_the_reference_and_not_the_measurement() {
   const double declinationDeg = 11.7;
   const Quaterniond truth = fromEuler(5.0, -8.0, 70.0);
@@ -35,7 +36,7 @@ void test_declination_turns_the_reference_and_not_the_measurement() {
   TEST_ASSERT_TRUE((reference - fieldNed(declinationDeg)).norm() < 1e-4);  // uT, of 50
 
   // The filter compares the raw measurement with it: at the true attitude nothing is left over.
-  strix::ESKF filter = filterAt(truth, found.magReference);
+  strix::ESKF<States> filter = filterAt<States>(truth, found.magReference);
   filter.predict(toFloat(restForce(truth)), strix::Vector3f::Zero(), 0);
   filter.updateMagMeas(mag, 10'000);
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -43,6 +44,7 @@ void test_declination_turns_the_reference_and_not_the_measurement() {
   }
 }
 
+template <int States>
 void test_without_a_magnetometer_the_heading_is_zero_and_no_field_is_expected() {
   const Quaterniond truth = fromEuler(10.0, 20.0, 0.0);
   const strix::Alignment found =
@@ -50,16 +52,17 @@ void test_without_a_magnetometer_the_heading_is_zero_and_no_field_is_expected() 
   TEST_ASSERT_TRUE(angleDeg(truth, toDouble(found.attitude)) < 1e-4);
   TEST_ASSERT_TRUE(found.magReference.isZero(0.0F));
 
-  strix::ESKF filter = filterAt(truth, found.magReference);
+  strix::ESKF<States> filter = filterAt<States>(truth, found.magReference);
   filter.predict(toFloat(restForce(truth)), strix::Vector3f::Zero(), 0);
   filter.updateMagMeas({20.0F, 5.0F, 40.0F}, 10'000);
   TEST_ASSERT_EQUAL(0, filter.magInnovation().count);
 }
 
+template <int States>
 void test_the_start_is_unsure_of_heading_about_the_vertical_whatever_the_attitude() {
-  const strix::NavigationConfig config;
+  const strix::NavigationConfig config = testConfig();
   const Quaterniond onItsSide = fromEuler(90.0, 0.0, 0.0);  // down is the body's +y
-  const strix::ESKF filter = filterAt(onItsSide, strix::Vector3f::Zero(), config);
+  const strix::ESKF<States> filter = filterAt<States>(onItsSide, strix::Vector3f::Zero(), config);
   const float heading = config.headingSigma0 * config.headingSigma0;
   const float tilt = config.tiltSigma0 * config.tiltSigma0;
   TEST_ASSERT_FLOAT_WITHIN(1e-6F, tilt, filter.covariance()(6, 6));
@@ -72,7 +75,7 @@ void test_the_start_is_unsure_of_heading_about_the_vertical_whatever_the_attitud
 void runAlignmentTests() {
   Unity.TestFile = __FILE__;
   RUN_TEST(test_alignment_recovers_any_attitude_from_gravity_and_field);
-  RUN_TEST(test_declination_turns_the_reference_and_not_the_measurement);
-  RUN_TEST(test_without_a_magnetometer_the_heading_is_zero_and_no_field_is_expected);
-  RUN_TEST(test_the_start_is_unsure_of_heading_about_the_vertical_whatever_the_attitude);
+  RUN_BOTH(test_declination_turns_the_reference_and_not_the_measurement);
+  RUN_BOTH(test_without_a_magnetometer_the_heading_is_zero_and_no_field_is_expected);
+  RUN_BOTH(test_the_start_is_unsure_of_heading_about_the_vertical_whatever_the_attitude);
 }

@@ -9,8 +9,10 @@ using strix::Vector3f;
 /// One hour of the 1 kHz loop, turning about all axes, inverted included; the clock wraps near its
 /// end. Measurements agree with the state, so that every one is accepted and P is as small, and so
 /// as close to losing its rank, as it gets.
-void test_the_covariance_stays_symmetric_and_positive_definite_for_an_hour() {
-  strix::ESKF filter = filterAt(fromEuler(0.0, 0.0, 30.0), Vector3f(20.0F, 3.0F, 45.0F));
+template <int States>
+void keepsItsCovariance(const strix::NavigationConfig& config) {
+  strix::ESKF<States> filter =
+      filterAt<States>(fromEuler(0.0, 0.0, 30.0), Vector3f(20.0F, 3.0F, 45.0F), config);
   const Vector3f down(0.0F, 0.0F, 1.0F);
   Micros now = 0xFFFFFFFFU - 3'000'000'000U;
   for (std::uint32_t i = 0; i < 3'600'000U; ++i, now += 1'000) {
@@ -36,9 +38,26 @@ void test_the_covariance_stays_symmetric_and_positive_definite_for_an_hour() {
   TEST_ASSERT_EQUAL(0, filter.gpsInnovation().rejections);
 }
 
+template <int States>
+void test_the_covariance_stays_symmetric_and_positive_definite_for_an_hour() {
+  keepsItsCovariance<States>(testConfig());
+}
+
+/// Biases that do not walk are known better for ever, and their variances shrink without end.
+void test_constant_biases_keep_it_so_for_an_hour() {
+  strix::NavigationConfig config = testConfig();
+  config.accelBiasWalk = config.gyroBiasWalk = config.magBiasWalk = 0.0F;
+  keepsItsCovariance<18>(config);
+}
+
+/// As configured for flight.
+void test_the_defaults_keep_it_so_for_an_hour() { keepsItsCovariance<18>({}); }
+
 }  // namespace
 
 void runEnduranceTests() {
   Unity.TestFile = __FILE__;
-  RUN_TEST(test_the_covariance_stays_symmetric_and_positive_definite_for_an_hour);
+  RUN_BOTH(test_the_covariance_stays_symmetric_and_positive_definite_for_an_hour);
+  RUN_TEST(test_constant_biases_keep_it_so_for_an_hour);
+  RUN_TEST(test_the_defaults_keep_it_so_for_an_hour);
 }

@@ -1,6 +1,10 @@
 #include <unity.h>
 
+#include "ESKF.h"
 #include "suites.h"
+
+template class strix::ESKF<9>;  // Dense.h declares them to the other files
+template class strix::ESKF<18>;
 
 void setUp() {}
 void tearDown() {}
@@ -10,8 +14,21 @@ int main() {
   runAlignmentTests();
   runPropagationTests();
   runUpdateTests();
+  runHeadingTests();
+  runReadmissionTests();
+  runTrapTests();
   runConvergenceTests();
   runEnduranceTests();
+  runVectorTests();
+  runStandstillTests();
+  runFieldTrackerTests();
+  runVibrationTests();
+  runComplementaryTests();
+  runMotionHistoryTests();
+  runHealthTests();
+  runDelayTests();
+  runPolicyTests();
+  runRecoveryTests();
   UNITY_END();
   return 0;
 }

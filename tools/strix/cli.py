@@ -89,15 +89,18 @@ def estimate(
     delay: Annotated[
         str, typer.Option(help="Age of readings, s: gps=0.22,baro=0.35,mag=0.03")
     ] = "",
+    states: Annotated[int, typer.Option(help="Of the filter: 18, or 9 without biases")] = 18,
 ) -> None:
-    """Run the flight filter on a recording of real sensors."""
+    """Run the flight navigation on a recording of real sensors."""
     import math
 
     from strix import estimate as library
     from strix.recording import read_recording
 
     delays_s = library.parse_delays(delay)
-    result = library.estimate(read_recording(recording), math.radians(declination), delays_s)
+    result = library.estimate(
+        read_recording(recording), math.radians(declination), delays_s, states=states
+    )
     if result.start.note:
         print(f"strix: {result.start.note}", file=sys.stderr)
     library.write_estimate(out, result)
@@ -119,6 +122,57 @@ def score(
         library.read_attitude(estimate), library.read_reference(reference), after
     )
     print(json.dumps(result.to_dict()) if as_json else result.table())
+
+
+@app.command(epilog="Example: strix accuracy --data ../shared/data --out out")
+@says_what_is_wrong
+def accuracy(
+    data: Annotated[Path, typer.Option(help="Folder of recordings, a folder each")] = Path(
+        "../shared/data"
+    ),
+    out: Annotated[Path, typer.Option(help="Folder for accuracy.json")] = Path("out"),
+) -> None:
+    """Score the navigation on recordings of real sensors, beside VQF.
+
+    Exits with 1 when a target of the defaults is missed.
+    """
+    from strix.accuracy_table import print_accuracy, run_accuracy
+
+    found = run_accuracy(data, out)
+    print_accuracy(found)
+    print(f"{out}/accuracy.json")
+    if not all(target.met for target in found.targets()):
+        raise typer.Exit(1)
+
+
+@app.command(epilog="Example: strix consistency --flights 200 --out out")
+@says_what_is_wrong
+def consistency(
+    flights: Annotated[int, typer.Option(min=2, help="Of each kind, 60 s each")] = 200,
+    hours: Annotated[float, typer.Option(min=0.02, help="Of the endurance flight")] = 4.0,
+    seed: Annotated[int, typer.Option(min=0, help="Of all flights")] = 1,
+    out: Annotated[Path, typer.Option(help="Folder for consistency.json and .html")] = Path("out"),
+) -> None:
+    """Check the filter against its own claim: NEES, NIS, covariance. Exits with 1 if it fails."""
+    from strix import consistency as library
+
+    found = library.check_and_report(flights, hours, seed, out)
+    library.print_consistency(found)
+    print(f"{out}/consistency.html, {out}/consistency.json")
+    if not found.consistent:
+        raise typer.Exit(1)
+
+
+@app.command(epilog="Example: strix options --out docs/figures")
+@says_what_is_wrong
+def options(
+    out: Annotated[Path, typer.Option(help="Folder for the figures")] = Path("docs/figures"),
+) -> None:
+    """Fly each option of the navigation off and on: its figure, and its numbers (mean, largest)."""
+    from strix.options import write_figures
+
+    for table in write_figures(out):
+        print(table)
 
 
 @app.command(epilog="Example: strix gains --vehicle Quad5in --check")

@@ -11,14 +11,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strix._core import ESKF, GeoPoint, LocalFrame, NavigationConfig, alignStill
+from strix._core import (
+    GeoPoint,
+    LocalFrame,
+    Navigation9,
+    Navigation18,
+    NavigationConfig,
+    alignStill,
+)
 from strix.errors import BadInput
 from strix.recording import FIX, FIX_3D, PLACE, VELOCITY, Array, Recording
 from strix.still import StillStart, find_still_start
 
 EST_COLUMNS = ("t_s", "qw", "qx", "qy", "qz", "pn", "pe", "pd", "vn", "ve", "vd")
 DELAYED_SENSORS = ("mag", "baro", "gps")
-MAX_DELAY_S = 5.0
+MAX_DELAY_S = 0.6  # what MotionHistory.h remembers
+NAVIGATIONS: dict[int, type[Navigation9] | type[Navigation18]] = {9: Navigation9, 18: Navigation18}
 
 
 @dataclass(frozen=True)
@@ -27,6 +35,7 @@ class Estimate:
 
     table: Array  # columns as in EST_COLUMNS
     start: StillStart
+    gps_innovations: Array  # t_s, north and east in m, north and east in m/s, a row a fix
 
 
 def parse_delays(text: str) -> dict[str, float]:
@@ -56,24 +65,33 @@ def estimate(
     declination_rad: float = 0.0,
     delays_s: Mapping[str, float] | None = None,
     config: NavigationConfig | None = None,
+    states: int = 18,
 ) -> Estimate:
-    """Align at the still start and run the filter from there, in the order of the flight loop.
+    """Align at the still start and run the navigation from there, in the order of the flight loop.
 
-    A reading is used at the IMU sample nearest to the time it was measured: its time stamp less
-    its sensor's delay.
+    A reading is used at the IMU sample nearest to its time stamp, and of GPS and barometer the
+    navigation knows the age. The field's time stamp is moved back by its age instead: the
+    navigation remembers where it was, but not how it was turned.
     """
+    if states not in NAVIGATIONS:
+        raise BadInput(f"--states: expected 9 or 18, found {states}")
     if not math.isfinite(declination_rad):
         raise BadInput(f"--declination: expected a number of degrees, found {declination_rad}")
-    recording = _undelayed(recording, delays_s or {})
+    delays_s = delays_s or {}
+    recording = _undelayed(recording, {"mag": delays_s.get("mag", 0.0)})
     start = find_still_start(recording)
     imu = recording.imu[np.searchsorted(recording.imu[:, 0], start.begin_s) :]
-    config = config or (NavigationConfig() if start.resting else _started_in_motion())
+    config = config or NavigationConfig()
+    if not start.resting:
+        _expect_motion(config)
+    config.gpsDelay = round(1e6 * delays_s.get("gps", 0.0))
+    config.altDelay = round(1e6 * delays_s.get("baro", 0.0))
     gravity = float(np.linalg.norm(start.accel_m_s2)) if start.resting else config.gravity
-    filter_ = ESKF(config)
+    navigation = NAVIGATIONS[states](config)
     alignment = alignStill(_single(start.accel_m_s2), _single(start.mag_ut), declination_rad)
-    filter_.initialize(alignment, gravity)
 
     now = micros(imu[:, 0])
+    navigation.initialize(alignment, gravity, now[0])
     accel = _single(imu[:, 1:4])
     gyro = _single(imu[:, 4:7] - start.gyro_bias_rad_s)
     mag = _Readings(recording.mag, imu)
@@ -84,22 +102,24 @@ def estimate(
     position = _single(local_ned(gps.table[:, PLACE], start.place))
     velocity = _single(gps.table[:, VELOCITY])
 
+    innovations: list[list[float]] = []
     table = np.empty((len(imu), len(EST_COLUMNS)))
     table[:, 0] = imu[:, 0]
     for row in range(len(imu)):
-        filter_.predict(accel[row], gyro[row], now[row])
-        filter_.updateTiltMeas(accel[row])
+        navigation.predict(accel[row], gyro[row], now[row])
+        navigation.updateTiltMeas(accel[row])
         for i in mag.at(row):
-            filter_.updateMagMeas(mag_ut[i], mag.now[i])
+            navigation.updateMagMeas(mag_ut[i], now[row])
         for i in alt.at(row):
-            filter_.updateAltMeas(height_m[i], alt.now[i])
+            navigation.updateAltMeas(height_m[i], now[row])
         for i in gps.at(row):
-            filter_.updateGPSMeas(position[i], velocity[i])
-        filter_.injectError()
-        table[row, 1:5] = filter_.attitude
-        table[row, 5:8] = filter_.positionNed
-        table[row, 8:11] = filter_.velocityNed
-    return Estimate(table, start)
+            navigation.updateGPSMeas(position[i], velocity[i], now[row])
+            innovations.append([imu[row, 0], *navigation.gpsInnovation().value])
+        navigation.finishPass(now[row])
+        table[row, 1:5] = navigation.attitude
+        table[row, 5:8] = navigation.positionNed
+        table[row, 8:11] = navigation.velocityNed
+    return Estimate(table, start, np.array(innovations).reshape(-1, 5))
 
 
 def write_estimate(path: Path, result: Estimate) -> None:
@@ -137,14 +157,12 @@ def _geo_point(place: Array) -> GeoPoint:
     return GeoPoint(latitude, longitude, altitude)
 
 
-def _started_in_motion() -> NavigationConfig:
-    """The defaults, but unsure of the alignment, which took accelerations for gravity."""
-    config = NavigationConfig()
+def _expect_motion(config: NavigationConfig) -> None:
+    """Be unsure of an alignment that took accelerations for gravity."""
     config.positionSigma0 = 5.0
     config.velocitySigma0 = 5.0
     config.tiltSigma0 = 0.2
     config.headingSigma0 = 0.5
-    return config
 
 
 class _Readings:

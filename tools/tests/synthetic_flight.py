@@ -176,7 +176,9 @@ def write_flight(path: Path) -> SyntheticFlight:
 
     t50 = times(50.0)
     settle = np.exp(-t50 / 3.0)[:, None]
-    sigma = np.repeat([0.35, 0.07, 0.008], 3) * (1.0 + 2.0 * settle)
+    # Position, velocity, attitude; biases of accelerometer, gyro and magnetometer.
+    levels = np.repeat([0.35, 0.07, 0.008, 0.02, 0.001, 0.0], 3)
+    sigma = levels * (1.0 + 2.0 * settle)
     log.topic("estimator_std", t50, {"std_dev": sigma})
     log.topic("estimator_start", [5.0], {"gravity": 9.807})
 

@@ -3,6 +3,7 @@
 
 #include <nanobind/nanobind.h>
 
+void bindConsistency(nanobind::module_& m);
 void bindEstimator(nanobind::module_& m);
 void bindFlight(nanobind::module_& m);
 void bindVehicles(nanobind::module_& m);
