@@ -1,0 +1,6 @@
+function names = inputs_columns()
+% Columns of inputs.csv. A measurement counts where its flag, *_due, is 1.
+names = {'t_us', 'accel_x', 'accel_y', 'accel_z', 'gyro_x', 'gyro_y', 'gyro_z', ...
+         'mag_due', 'mag_x', 'mag_y', 'mag_z', 'alt_due', 'height', ...
+         'gps_due', 'gps_pn', 'gps_pe', 'gps_vn', 'gps_ve'};
+end
