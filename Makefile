@@ -6,10 +6,10 @@ SETUP := @$(PYTHON) tools/setup/setup.py
 # The virtual environment without the compiled core, for what does not need it.
 ENVIRONMENT := $(SETUP) environment
 
-.PHONY: help setup fly test pio gains firmware format lint pins clean
+.PHONY: help setup fly test pio gains vectors bench consistency accuracy figures firmware format lint pins clean
 
 help: ## List these verbs
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-11s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 setup: ## Make or update .venv and the compiled core
 	$(SETUP)
@@ -29,6 +29,25 @@ pio: ## Run PlatformIO, with its registry or without (ARGS="test -e native -f te
 gains: ## Compute the controller's gains into include/
 	$(SETUP)
 	@$(VENV)/strix gains $(ARGS)
+
+vectors: ## Write sim_vectors/ anew with GNU Octave or MATLAB
+	@$(PYTHON) tools/setup/vectors.py
+
+bench: ## Count instructions per call on an emulated Cortex-M7, beside the budgets
+	$(ENVIRONMENT)
+	@$(VENV)/python tools/m7/bench.py
+
+consistency: ## Check in many simulated flights that the filter is as sure of itself as it may be
+	$(SETUP)
+	@$(VENV)/strix consistency --out out $(ARGS)
+
+accuracy: ## Score the filter on the recordings in ../shared/data, beside VQF
+	$(SETUP)
+	@$(VENV)/strix accuracy --out out $(ARGS)
+
+figures: ## Draw what each option of the navigation buys, into docs/figures
+	$(SETUP)
+	@$(VENV)/strix options --out docs/figures
 
 firmware: ## Build the firmware for the Teensy 4.1 (needs PlatformIO's registry)
 	$(ENVIRONMENT)

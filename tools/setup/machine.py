@@ -71,6 +71,29 @@ def require_build_tools() -> None:
         install(missing)
 
 
+# What some tests want and skip without: the independent reference, the emulated processor.
+OPTIONAL_PACKAGES = {
+    "octave-cli": ["octave", "octave-control"],
+    "arm-none-eabi-g++": [
+        "gcc-arm-none-eabi",
+        "libnewlib-arm-none-eabi",
+        "libstdc++-arm-none-eabi-newlib",
+    ],
+    "qemu-system-arm": ["qemu-system-arm"],
+}
+
+
+def install_optional() -> None:
+    """Install what is missing of it; where that fails, the tests say what they skip and why."""
+    for program, packages in OPTIONAL_PACKAGES.items():
+        if shutil.which(program):
+            continue
+        try:
+            install(packages)
+        except SystemExit:
+            say(f"goes on without {program}")
+
+
 def install(packages: list[str]) -> None:
     """Install Debian packages if we may, else say in one line what to install."""
     names = " ".join(packages)

@@ -1,7 +1,8 @@
 """`make setup`: the virtual environment and the compiled core, made or brought up to date.
 
 Three steps, each skipped when its result is current, so a second run costs a fraction of a second
-(`setup.py environment` leaves out the third):
+(`setup.py environment` leaves out the third; `setup.py optional` does something else: it installs
+the Debian packages that some tests want and skip without):
 
 1. .venv with the pinned packages of tools/requirements.txt;
 2. the package `strix` in it, editable: Python files are used where they lie;
@@ -19,7 +20,15 @@ import subprocess
 import sys
 from pathlib import Path
 
-from machine import ROOT, alone, fail, require_build_tools, say, use_supported_python
+from machine import (
+    ROOT,
+    alone,
+    fail,
+    install_optional,
+    require_build_tools,
+    say,
+    use_supported_python,
+)
 
 VENV = ROOT / ".venv"
 STAMP = VENV / "strix-setup.stamp"
@@ -31,6 +40,9 @@ CORE_BUILD = ROOT / "build" / "core"
 def main() -> None:
     use_supported_python()
     with alone("setup"):
+        if sys.argv[1:] == ["optional"]:
+            install_optional()
+            return
         set_up_environment()
         if sys.argv[1:] != ["environment"]:
             build_core()
