@@ -42,6 +42,8 @@ class Controller {
     achieved_ = Wrench::none();
   }
 
+  [[nodiscard]] bool due(Micros now) const { return task_.due(now); }
+
   /// One control step when it is due.
   /// @return true when getControl() is new
   bool updateControl(Micros now, const Reference& reference, const VehicleState& state) {

@@ -5,6 +5,7 @@
 #include "Board.h"
 #include "Controller.h"
 #include "DataTypes.h"
+#include "Mission.h"
 #include "Motors.h"
 #include "Navigation.h"
 #include "Sensors.h"
@@ -33,6 +34,23 @@ namespace strix {
 [[nodiscard]] inline topic::ManualControlSwitches toRecord(LogTime time,
                                                            const PilotSwitches& pilot) {
   return {time, switchPosition(pilot.arm), switchPosition(pilot.kill), switchPosition(pilot.start)};
+}
+
+[[nodiscard]] inline topic::FlightConfig toRecord(LogTime time, const Mission& mission,
+                                                  float declination, const SensorSet& found) {
+  const std::array<bool, 5> devices{found.imu, found.mag, found.alt, found.gps, found.card};
+  unsigned answered = 0;
+  for (std::size_t i = 0; i < devices.size(); ++i) answered |= devices[i] ? 1U << i : 0U;
+  return {time,
+          declination,
+          mission.takeoffHeight,
+          mission.takeoffHoldTime,
+          mission.legCount,
+          static_cast<std::uint8_t>(answered)};
+}
+
+[[nodiscard]] inline topic::MissionLeg toRecord(LogTime time, const Leg& leg) {
+  return {time, leg.north, leg.east, leg.height, leg.turn, leg.holdTime};
 }
 
 [[nodiscard]] inline topic::EstimatorAidSource toRecord(LogTime time,

@@ -50,14 +50,22 @@ class FlightSoftware {
     for (PeriodicTask* task : {&stateLog_, &switchLog_, &stdLog_, &statusLog_}) task->start(now);
     logger_.begin(time,
                   {config_.vehicle.name, Board::kName, kVersion, kGitCommit, board_.bootId()});
+    const Mission& mission = config_.mission;
+    logger_.log(toRecord(time, mission, config_.declination, found_));
+    for (std::size_t i = 0; i < mission.legCount && i < Mission::kMaxLegs; ++i) {
+      logger_.log(toRecord(time, mission.legs[i]));
+    }
   }
 
-  /// One pass. Nothing in it waits.
+  /// One pass. Nothing in it waits. Only a reading or a control tick changes anything, and both are
+  /// logged with the time of their pass: from those a replay makes the same passes again.
   void loop() {
     const Micros now = board_.micros();  // the one time stamp of this pass
     const LogTime time = clock_.update(now);
+    bool heard = false;
 
     if (sensors_.imuUpdate(now)) {
+      heard = true;
       const ImuRaw& raw = sensors_.getIMUMeas();
       const ImuSample imu = sensors_.processIMUMeas(raw);
       startCalibration_.addImu(imu.sampled, imu.accel, imu.gyro);  // until it is done;
@@ -67,6 +75,7 @@ class FlightSoftware {
       logAid<AidSource::Tilt>(time, estimator().tiltInnovation());
     }
     if (sensors_.magUpdate(now)) {
+      heard = true;
       const MagRaw& raw = sensors_.getMagMeas();
       const Vector3f field = sensors_.processMagMeas(raw);
       startCalibration_.addMag(field);
@@ -75,6 +84,7 @@ class FlightSoftware {
       logAid<AidSource::Magnetometer>(time, estimator().magInnovation());
     }
     if (sensors_.altUpdate(now)) {
+      heard = true;
       const AltRaw& raw = sensors_.getAltMeas();
       startCalibration_.addPressure(raw.pressure);
       navigation_.updateAltMeas(sensors_.processAltMeas(raw), now);
@@ -82,6 +92,7 @@ class FlightSoftware {
       logAid<AidSource::Altimeter>(time, estimator().altInnovation());
     }
     if (sensors_.gpsUpdate(now)) {
+      heard = true;
       const GpsRaw& raw = sensors_.getGPSMeas();
       if (sensors_.gpsUsable(raw)) {
         if (!everArmed_) averageOrigin(raw);
@@ -91,20 +102,11 @@ class FlightSoftware {
       logger_.logGPS(toRecord(time, clock_.at(raw.sampled), raw));
       logAid<AidSource::Gps>(time, estimator().gpsInnovation());
     }
-    navigation_.finishPass(now);
-    if (calibrating() && startCalibration_.done()) finishCalibration(now, time);
-
-    const VehicleState estimate = navigation_.state();
-    updateStateMachine(now, time, estimate);
-    const Reference& reference = guidance_.update(now);
-    if (controller_.updateControl(now, reference, estimate)) {
-      motors_.commandControl(fsm_.getControlFlag() ? controller_.getControl() : Wrench::none());
-      motors_.writeESC(board_);
-      controller_.setAchieved(motors_.achieved());
-      logger_.logGNC(toRecords(time, estimate, reference, controller_, motors_, tick(now, time)));
+    if (heard) {
+      navigation_.finishPass(now);
+      if (calibrating() && startCalibration_.done()) finishCalibration(now, time);
     }
-    navigation_.setMotors(motorState(now));
-    logNavigation(now, time);
+    if (controller_.due(now)) controlTick(now, time);
     logger_.write(time);
     logger_.flush(time);
     lastPass_ = now;
@@ -119,12 +121,30 @@ class FlightSoftware {
   [[nodiscard]] const Guidance& guidance() const { return guidance_; }
   [[nodiscard]] Logger<typename Board::Card>& logger() { return logger_; }
 
+  /// What the last control tick logged of itself.
+  [[nodiscard]] const topic::ControlTick& lastTick() const { return lastTick_; }
+
   /// Periods of any task missed since the start.
   [[nodiscard]] std::uint32_t overruns() const {
     return sensors_.overruns() + controller_.overruns();
   }
 
  private:
+  /// Every 2 ms: what the pilot wants, where to be, what it takes, and the motors.
+  void controlTick(Micros now, LogTime time) {
+    const VehicleState estimate = navigation_.state();
+    updateStateMachine(now, time, estimate);
+    const Reference& reference = guidance_.update(now);
+    controller_.updateControl(now, reference, estimate);
+    motors_.commandControl(fsm_.getControlFlag() ? controller_.getControl() : Wrench::none());
+    motors_.writeESC(board_);
+    controller_.setAchieved(motors_.achieved());
+    navigation_.setMotors(motorState(now));
+    lastTick_ = tick(now, time);
+    logger_.logGNC(toRecords(time, estimate, reference, controller_, motors_, lastTick_));
+    logNavigation(now, time);
+  }
+
   [[nodiscard]] bool calibrating() const { return fsm_.state() == FlightState::Boot; }
 
   /// Aligns the filter with what the still aircraft showed.
@@ -168,10 +188,7 @@ class FlightSoftware {
       guidance_.enter(fsm_.state(), now, estimate);
       if (fsm_.getMotorFlag() && !motors_.armed()) motors_.arm();
       everArmed_ = everArmed_ || motors_.armed();
-      if (!fsm_.getMotorFlag() && motors_.armed()) {
-        motors_.disarm();
-        motors_.writeESC(board_);  // now, not at the next control tick
-      }
+      if (!fsm_.getMotorFlag() && motors_.armed()) motors_.disarm();  // written by this tick
       say(time, *row, failures);
     }
     if (row != nullptr || stateLog_.due(now)) {
@@ -312,6 +329,7 @@ class FlightSoftware {
   NavigationHealth loggedHealth_ = health::kNone;
   std::uint32_t loggedReadmissions_ = 0;
   PilotSwitches loggedPilot_;
+  topic::ControlTick lastTick_;
   Micros entered_ = 0;  ///< when the present state began
   Micros lastPass_ = 0;
   bool everArmed_ = false;

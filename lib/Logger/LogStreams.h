@@ -67,6 +67,8 @@ using LogStreams = std::tuple<
     LogStream<topic::SensorBaro,             0,      50,         1,      2000>,
     LogStream<topic::VehicleGpsPosition,     0,      10,         1,      2000>,
     LogStream<topic::ManualControlSwitches,  0,       1,         1,     16000>,  // and on change
+    LogStream<topic::FlightConfig,           0,       1,         1,      8000>,  // once
+    LogStream<topic::MissionLeg,             0,       1,         1,     16000>,  // 16 at most, once
     LogStream<topic::VehicleAttitude,        0,     500,         1,      2000>,
     LogStream<topic::VehicleAngularVelocity, 0,     500,         1,      2000>,
     LogStream<topic::VehicleLocalPosition,   0,     500,         5,      2000>,

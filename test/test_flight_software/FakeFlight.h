@@ -37,6 +37,12 @@ class BasicFakeFlight {
     board.advance(passTime);
   }
 
+  /// Passes up to and with the next control tick, which looks at the switches.
+  void tick() {
+    const LogTime last = software.lastTick().timestamp;
+    for (int i = 0; i < 100 && software.lastTick().timestamp == last; ++i) pass();
+  }
+
   void run(float seconds) {
     const std::uint64_t end = board.time() + static_cast<std::uint64_t>(seconds * 1e6F);
     while (board.time() < end) pass();
@@ -61,9 +67,9 @@ class BasicFakeFlight {
   /// Switches off and on again; true when the motors are on after it.
   bool arm() {
     board.pilot = {};
-    pass();
+    tick();
     board.pilot.arm = true;
-    pass();
+    tick();
     return state() == FlightState::Armed;
   }
 

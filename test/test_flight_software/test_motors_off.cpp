@@ -71,19 +71,6 @@ void test_disarming_reaches_the_escs_within_a_control_period_whatever_is_broken(
   assertStopsFromEveryStateInEveryTrouble([](PilotSwitches& pilot) { pilot.arm = false; });
 }
 
-void test_a_disarm_is_written_in_the_pass_that_sees_it() {
-  FakeFlight flight;
-  flight.getReady();
-  flight.reach(FlightState::Hold);
-  flight.passTime = 100;  // 20 passes a control period: a tick in this very one would be chance
-  for (int i = 0; i < 7; ++i) flight.pass();
-  flight.board.pilot.arm = false;
-  const std::uint64_t flipped = flight.board.time();
-  flight.pass();
-  TEST_ASSERT_TRUE(flight.board.escWrites.back().time == flipped);
-  TEST_ASSERT_TRUE(areOff(flight.board.esc()));
-}
-
 void test_the_kill_switch_reaches_the_escs_within_a_control_period_whatever_is_broken() {
   assertStopsFromEveryStateInEveryTrouble([](PilotSwitches& pilot) { pilot.kill = true; });
 }
@@ -109,7 +96,7 @@ void test_disarming_on_the_ground_leads_to_idle_and_in_flight_to_safe() {
     flight.getReady();
     flight.reach(state);
     flight.board.pilot.arm = false;
-    flight.pass();
+    flight.tick();
     TEST_ASSERT_TRUE(flight.state() ==
                      (state == FlightState::Armed ? FlightState::Idle : FlightState::Safe));
   }
@@ -214,7 +201,7 @@ void test_safe_is_left_only_by_arming_anew_on_the_ground() {
   flight.getReady();
   flight.reach(FlightState::Hold);
   flight.board.pilot.kill = true;
-  flight.pass();
+  flight.tick();
   TEST_ASSERT_TRUE(flight.state() == FlightState::Safe);
   flight.board.pilot.kill = false;
   flight.board.pilot.start = false;
@@ -250,7 +237,6 @@ void test_the_log_tells_why_the_motors_stopped() {
 void runMotorsOffTests() {
   Unity.TestFile = __FILE__;
   RUN_TEST(test_disarming_reaches_the_escs_within_a_control_period_whatever_is_broken);
-  RUN_TEST(test_a_disarm_is_written_in_the_pass_that_sees_it);
   RUN_TEST(test_the_kill_switch_reaches_the_escs_within_a_control_period_whatever_is_broken);
   RUN_TEST(test_a_trouble_that_has_lasted_does_not_delay_disarming_either);
   RUN_TEST(test_disarming_on_the_ground_leads_to_idle_and_in_flight_to_safe);

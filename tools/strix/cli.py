@@ -78,6 +78,37 @@ def fly(
         raise typer.Exit(1)
 
 
+@app.command(
+    epilog="Example: strix replay out/flight.ulg --set nav.gpsPositionSigma=2 -o what-if.ulg"
+)
+@says_what_is_wrong
+def replay(
+    log: Annotated[Path, typer.Argument(help="Flight log, .ulg")],
+    check: Annotated[
+        bool, typer.Option("--check", help="Stop at the first control tick that differs")
+    ] = False,
+    changes: Annotated[
+        list[str] | None, typer.Option("--set", help="Another tuning: nav.NAME=VALUE, repeatable")
+    ] = None,
+    states: Annotated[int, typer.Option(help="Of the filter: 18, or 9 without biases")] = 18,
+    gains: Annotated[
+        Path | None, typer.Option(help="Other gains: a header as strix gains writes it")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="The replay's own log")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON")] = False,
+) -> None:
+    """Feed a log's inputs to the same flight software and compare every control tick.
+
+    Exits with 1 when a tick differs and nothing was changed.
+    """
+    from strix import replay as library
+
+    found = library.replay(log, changes or [], states, gains, out, check)
+    print(json.dumps(found.to_dict()) if as_json else "\n".join(found.sentences()))
+    if not found.same and not found.changed:
+        raise typer.Exit(1)
+
+
 @app.command(epilog="Example: strix estimate recording/ --declination 11.7 --delay gps=0.22")
 @says_what_is_wrong
 def estimate(

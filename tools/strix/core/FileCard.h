@@ -9,19 +9,20 @@
 
 namespace strix {
 
-/// Never busy. The file ends where the last sync said it does, as the card's would.
+/// Never busy. The file ends where the last sync said it does, as the card's would. Without a path
+/// it takes everything and keeps nothing.
 class FileCard {
  public:
   explicit FileCard(const std::string& path)
-      : path_(path), file_(std::fopen(path.c_str(), "wb+")) {}
+      : path_(path), file_(path.empty() ? nullptr : std::fopen(path.c_str(), "wb+")) {}
 
   /// False when the file could not be made; errno says why.
-  [[nodiscard]] bool open() const { return file_ != nullptr; }
+  [[nodiscard]] bool open() const { return path_.empty() || file_ != nullptr; }
 
   [[nodiscard]] bool busy() const { return false; }
 
   [[nodiscard]] bool writeSector(std::uint32_t index, const std::uint8_t (&data)[kSectorSize]) {
-    if (file_ == nullptr) return false;
+    if (file_ == nullptr) return path_.empty();
     const long offset = static_cast<long>(index) * static_cast<long>(kSectorSize);
     return std::fseek(file_.get(), offset, SEEK_SET) == 0 &&
            std::fwrite(data, 1, kSectorSize, file_.get()) == kSectorSize;

@@ -21,7 +21,11 @@ class SimulatedBoard {
   // What a Board offers (Board.h).
   [[nodiscard]] std::uint32_t bootId() const { return bootId_; }
   [[nodiscard]] Micros micros() const { return now_; }
-  [[nodiscard]] SensorSet begin() { return {true, true, true, true, card_.open()}; }
+  [[nodiscard]] SensorSet begin() {
+    SensorSet found = devices_;
+    found.card = found.card && card_.open();
+    return found;
+  }
   [[nodiscard]] bool readImu(ImuRaw& out) { return take(imu_, out); }
   [[nodiscard]] bool readMag(MagRaw& out) { return take(mag_, out); }
   [[nodiscard]] bool readAlt(AltRaw& out) { return take(alt_, out); }
@@ -32,6 +36,7 @@ class SimulatedBoard {
 
   // The outside. A reading stays until it is read or a newer one takes its place.
   void setTime(Micros now) { now_ = now; }
+  void setDevices(const SensorSet& devices) { devices_ = devices; }  ///< that answer begin()
   void setPilot(const PilotSwitches& pilot) { pilot_ = pilot; }
   void put(const ImuRaw& reading) { imu_ = reading; }
   void put(const MagRaw& reading) { mag_ = reading; }
@@ -51,6 +56,7 @@ class SimulatedBoard {
   FileCard card_;
   std::uint32_t bootId_;
   Micros now_ = 0;
+  SensorSet devices_{true, true, true, true, true};
   PilotSwitches pilot_;
   std::optional<ImuRaw> imu_;
   std::optional<MagRaw> mag_;

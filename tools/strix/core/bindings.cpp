@@ -6,5 +6,6 @@ NB_MODULE(_core, m) {
   bindEstimator(m);
   bindConsistency(m);  // of whose types it speaks
   bindFlight(m);
+  bindReplay(m);
   bindVehicles(m);
 }

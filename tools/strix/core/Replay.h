@@ -1,0 +1,205 @@
+/// A flight over again: the logged inputs through the same flight software.
+#pragma once
+
+#include <FlightConfig.h>
+#include <FlightSoftware.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+
+#include "LogReader.h"
+#include "SimulatedBoard.h"
+#include "vehicles/Vehicles.h"
+
+namespace strix {
+
+/// What a replay found.
+struct ReplayResult {
+  std::uint64_t begin = 0;     ///< us, log time
+  std::uint64_t end = 0;       ///< of the last pass
+  std::uint64_t logEnd = 0;    ///< of the log
+  std::uint32_t ticks = 0;     ///< control ticks compared
+  std::uint64_t firstBad = 0;  ///< time of the first tick that differs; 0: none
+  std::string field;           ///< in which it differs first
+  bool gap = false;            ///< ended where the log has lost inputs
+};
+
+using FlightLogReader =
+    LogReader<topic::SensorCombined, topic::SensorMag, topic::SensorBaro, topic::VehicleGpsPosition,
+              topic::ManualControlSwitches, topic::FlightConfig, topic::MissionLeg,
+              topic::ControlTick, topic::LogStatus, topic::VehicleAttitude,
+              topic::VehicleAngularVelocity, topic::WrenchSetpoint, topic::WrenchAchieved,
+              topic::ActuatorOutputs>;
+
+/// The next record of a topic that has not been reached yet.
+template <class Topic>
+class Cursor {
+ public:
+  explicit Cursor(const FlightLogReader& log) : records_(log.records<Topic>()) {}
+
+  [[nodiscard]] std::uint64_t time() const {
+    return next_ < records_.size() ? records_[next_].timestamp : UINT64_MAX;
+  }
+  /// The record of this very time, if there is one; moves on behind it.
+  const Topic* take(std::uint64_t time) {
+    while (next_ < records_.size() && records_[next_].timestamp < time) ++next_;
+    return next_ < records_.size() && records_[next_].timestamp == time ? &records_[next_++]
+                                                                        : nullptr;
+  }
+
+ private:
+  const std::vector<Topic>& records_;
+  std::size_t next_ = 0;
+};
+
+/// @tparam States  of the navigation filter
+template <int States>
+class Replay {
+ public:
+  /// @param config  what is flown; the log's own configuration, or another to see what it would do
+  /// @param logPath  where the replay writes its own log; empty: nowhere
+  Replay(const FlightLogReader& log, const FlightSoftwareConfig& config, const std::string& logPath)
+      : log_(log), board_(logPath, bootId()), software_(board_, config) {
+    if (!board_.card().open()) {
+      throw std::invalid_argument(logPath + ": cannot be written: " + std::strerror(errno));
+    }
+  }
+
+  /// @param compare  stop at the first control tick whose hash is not the logged one
+  ReplayResult run(bool compare) {
+    ReplayResult result;
+    const topic::FlightConfig& chosen = flightConfigOf(log_);
+    const std::uint64_t limit = firstGap(result);
+    board_.setTime(static_cast<Micros>(chosen.timestamp));
+    board_.setDevices(devicesOf(chosen));
+    result.begin = chosen.timestamp;
+    result.logEnd = log_.records<topic::ControlTick>().back().timestamp;
+    software_.setup();
+    for (;;) {
+      const std::uint64_t time = std::min({imu_.time(), mag_.time(), alt_.time(), gps_.time(),
+                                           tick_.time()});
+      if (time == UINT64_MAX) break;
+      if (time >= limit) {
+        result.gap = true;
+        break;
+      }
+      pass(time);
+      result.end = time;
+      const topic::ControlTick* logged = tick_.take(time);
+      const bool ticked = software_.lastTick().timestamp == time;
+      if (logged == nullptr && !ticked) continue;
+      ++result.ticks;
+      const bool same = logged != nullptr && ticked &&
+                        logged->state_hash == software_.lastTick().state_hash;
+      if (same || result.firstBad != 0) continue;
+      result.firstBad = time;
+      result.field = logged == nullptr ? "a control tick that the log has not"
+                     : !ticked         ? "no control tick where the log has one"
+                                       : firstField(time);
+      if (compare) break;
+    }
+    return result;
+  }
+
+  /// Writes the rest of the replay's own log.
+  bool close() {
+    Micros clock = board_.micros();
+    return software_.logger().forceWriteAndFlush([&clock] { return clock++; }, 10'000'000);
+  }
+
+  static const topic::FlightConfig& flightConfigOf(const FlightLogReader& log) {
+    const auto& records = log.records<topic::FlightConfig>();
+    if (records.empty() || log.records<topic::ControlTick>().empty()) {
+      log.refuse("a flight log from its beginning on, with flight_config and control_tick",
+                 "none of them");
+    }
+    return records.front();
+  }
+
+ private:
+  [[nodiscard]] static std::uint32_t bootId() { return 1; }
+
+  [[nodiscard]] static SensorSet devicesOf(const topic::FlightConfig& c) {
+    const auto has = [&c](unsigned bit) { return (c.devices & bit) != 0; };
+    return {has(1), has(2), has(4), has(8), has(16)};
+  }
+
+  /// Time up to which no input is missing: of the last status that has lost none.
+  [[nodiscard]] std::uint64_t firstGap(const ReplayResult& /*result*/) const {
+    std::uint64_t sound = 0;
+    for (const topic::LogStatus& status : log_.records<topic::LogStatus>()) {
+      const auto lost = [&status](std::size_t id) { return status.dropped_by_id[id] != 0; };
+      if (lost(logStreamId<topic::SensorCombined, 0>()) || lost(logStreamId<topic::SensorMag, 0>()) ||
+          lost(logStreamId<topic::SensorBaro, 0>()) ||
+          lost(logStreamId<topic::VehicleGpsPosition, 0>()) ||
+          lost(logStreamId<topic::ManualControlSwitches, 0>()) ||
+          lost(logStreamId<topic::ControlTick, 0>())) {
+        return sound;
+      }
+      sound = status.timestamp;
+    }
+    return UINT64_MAX;
+  }
+
+  void pass(std::uint64_t time) {
+    board_.setTime(static_cast<Micros>(time));
+    if (const auto* r = imu_.take(time)) {
+      board_.put(ImuRaw{static_cast<Micros>(r->timestamp_sample), toVector(r->accelerometer_m_s2),
+                        toVector(r->gyro_rad), r->temperature});
+    }
+    if (const auto* r = mag_.take(time)) {
+      board_.put(MagRaw{static_cast<Micros>(r->timestamp_sample), toVector(r->field_ut)});
+    }
+    if (const auto* r = alt_.take(time)) {
+      board_.put(AltRaw{static_cast<Micros>(r->timestamp_sample), r->pressure, r->temperature});
+    }
+    if (const auto* r = gps_.take(time)) {
+      board_.put(GpsRaw{static_cast<Micros>(r->timestamp_sample), r->lat, r->lon, r->alt,
+                        r->speed_knots, r->course_deg, r->hdop, r->fix_type, r->satellites_used});
+    }
+    while (switches_.time() <= time) {
+      const auto* r = switches_.take(switches_.time());
+      board_.setPilot({r->arm_switch == 1, r->kill_switch == 1, r->start_switch == 1});
+    }
+    software_.loop();
+  }
+
+  [[nodiscard]] static Vector3f toVector(const std::array<float, 3>& v) {
+    return {v[0], v[1], v[2]};
+  }
+
+  /// The first logged field in which the tick at `time` differs.
+  [[nodiscard]] std::string firstField(std::uint64_t time) const {
+    const GncRecords now =
+        toRecords(time, software_.navigation().state(), software_.guidance().reference(),
+                  software_.controller(), software_.motors(), software_.lastTick());
+    std::string field = differs(time, now.attitude);
+    if (field.empty()) field = differs(time, now.rate);
+    if (field.empty()) field = differs(time, now.wrenchSetpoint);
+    if (field.empty()) field = differs(time, now.wrenchAchieved);
+    if (field.empty()) field = differs(time, now.outputs);
+    return field.empty() ? "something that is not logged at this tick: position, velocity, "
+                           "covariance, bias or state"
+                         : field;
+  }
+
+  template <class Topic>
+  [[nodiscard]] std::string differs(std::uint64_t time, const Topic& replayed) const {
+    Cursor<Topic> cursor(log_);
+    const Topic* logged = cursor.take(time);
+    return logged == nullptr ? std::string() : firstDifference(*logged, replayed);
+  }
+
+  const FlightLogReader& log_;
+  SimulatedBoard board_;
+  FlightSoftware<SimulatedBoard, States> software_;
+  Cursor<topic::SensorCombined> imu_{log_};
+  Cursor<topic::SensorMag> mag_{log_};
+  Cursor<topic::SensorBaro> alt_{log_};
+  Cursor<topic::VehicleGpsPosition> gps_{log_};
+  Cursor<topic::ManualControlSwitches> switches_{log_};
+  Cursor<topic::ControlTick> tick_{log_};
+};
+
+}  // namespace strix

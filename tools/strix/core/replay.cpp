@@ -1,0 +1,90 @@
+/// Python's view of a replay.
+#include "Replay.h"
+
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+
+#include "bind.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace {
+
+using strix::FlightLogReader;
+
+strix::Mission missionOf(const FlightLogReader& log, const strix::topic::FlightConfig& chosen) {
+  strix::Mission mission{"replayed", chosen.takeoff_height, chosen.takeoff_hold, chosen.leg_count,
+                         {}};
+  const auto& legs = log.records<strix::topic::MissionLeg>();
+  if (legs.size() < mission.legCount || mission.legCount > strix::Mission::kMaxLegs) {
+    log.refuse(std::to_string(mission.legCount) + " legs of the mission",
+               std::to_string(legs.size()));
+  }
+  for (std::size_t i = 0; i < mission.legCount; ++i) {
+    mission.legs[i] = {legs[i].north, legs[i].east, legs[i].height, legs[i].turn, legs[i].hold};
+  }
+  return mission;
+}
+
+/// The configuration that flew, as this build of the software has it.
+strix::FlightSoftwareConfig configOf(const FlightLogReader& log) {
+  const strix::topic::FlightConfig& chosen = strix::Replay<18>::flightConfigOf(log);
+  const strix::Airframe* airframe = strix::findAirframe(log.info("vehicle"));
+  if (airframe == nullptr) {
+    log.refuse("a vehicle of include/vehicles", "'" + log.info("vehicle") + "'");
+  }
+  return strix::flightConfig(airframe->vehicle, airframe->gains, missionOf(log, chosen),
+                             chosen.declination);
+}
+
+template <int States>
+strix::ReplayResult run(const FlightLogReader& log, const strix::FlightSoftwareConfig& config,
+                        const std::string& out, bool compare) {
+  auto replay = std::make_unique<strix::Replay<States>>(log, config, out);
+  const strix::ReplayResult result = replay->run(compare);
+  if (!out.empty() && !replay->close()) {
+    throw std::invalid_argument(out + ": could not be written to its end");
+  }
+  return result;
+}
+
+using GainRows = std::array<std::array<float, strix::kErrorCount>, strix::kControlCount>;
+
+strix::ReplayResult replay(const FlightLogReader& log,
+                           const std::optional<strix::NavigationConfig>& navigation, int states,
+                           const std::optional<GainRows>& gains, const std::string& out,
+                           bool compare) {
+  strix::FlightSoftwareConfig chosen = configOf(log);
+  strix::Gains other = chosen.gains;
+  if (gains) other.k = *gains;
+  strix::FlightSoftwareConfig config{chosen.vehicle, other, chosen.mission};
+  config.sensors = chosen.sensors;
+  config.navigation = navigation.value_or(chosen.navigation);
+  config.declination = chosen.declination;
+  const nb::gil_scoped_release unlocked;
+  return states == 9 ? run<9>(log, config, out, compare) : run<18>(log, config, out, compare);
+}
+
+}  // namespace
+
+void bindReplay(nb::module_& m) {
+  using strix::ReplayResult;
+
+  nb::class_<ReplayResult>(m, "ReplayResult", "What a replay found; times in us of the log")
+      .def_ro("begin", &ReplayResult::begin)
+      .def_ro("end", &ReplayResult::end)
+      .def_ro("logEnd", &ReplayResult::logEnd)
+      .def_ro("ticks", &ReplayResult::ticks)
+      .def_ro("firstBad", &ReplayResult::firstBad)
+      .def_ro("field", &ReplayResult::field)
+      .def_ro("gap", &ReplayResult::gap);
+  nb::class_<FlightLogReader>(m, "FlightLogReader", "The inputs and control ticks of a flight log")
+      .def(nb::init<const std::string&>(), "path"_a)
+      .def("info", &FlightLogReader::info, "key"_a);
+  m.def("replayNavigation", [](const FlightLogReader& log) { return configOf(log).navigation; },
+        "log"_a, "The navigation's configuration that flew, to be changed and given to replay()");
+  m.def("replay", &replay, "log"_a, "navigation"_a.none(), "states"_a, "gains"_a.none(), "out"_a,
+        "compare"_a, "The logged inputs through the flight software");
+}
