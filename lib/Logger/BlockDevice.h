@@ -11,7 +11,9 @@
 ///                                                     until busy() is false again, for a card that
 ///                                                     reads by DMA. False: the card failed.
 ///   bool sync(uint32_t length);                       makes the first `length` bytes durable and
-///                                                     the file's size. False: the card failed.
+///                                                     the file's size, which it is when busy() is
+///                                                     false again. False: the card failed.
+/// None of them waits.
 #pragma once
 
 #include <cstddef>

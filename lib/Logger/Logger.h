@@ -62,8 +62,12 @@ class Logger {
   template <class Clock>
   bool forceWriteAndFlush(Clock&& clock, Micros budget);
 
-  /// True when the card refused kMaxFailures times in a row: nothing more is written.
-  [[nodiscard]] bool failed() const { return failuresInARow_ >= kMaxFailures; }
+  /// True when the log cannot be relied on: the card refused kMaxFailures times in a row, and
+  /// nothing more is written, or it has been busy for kLongestBusy. If that comes to an end, it
+  /// goes on.
+  [[nodiscard]] bool failed() const {
+    return dead() || (stalled_ && now_ - stalledSince_ >= kLongestBusy);
+  }
 
   /// Records lost to full rings, all topics and texts.
   [[nodiscard]] std::uint32_t dropped() const { return status(0).dropped; }
@@ -72,7 +76,8 @@ class Logger {
   [[nodiscard]] topic::LogStatus status(LogTime now) const;
 
  private:
-  static constexpr std::uint32_t kMaxFailures = 20;  // at one try each 50 ms: a second
+  static constexpr std::uint32_t kMaxFailures = 20;    // at one try each 50 ms: a second
+  static constexpr LogTime kLongestBusy = 10'000'000;  // us; 4 s were measured on a sound card
   static_assert(LogHeader::maxSize() + SectorStream<Card>::kBlockEnd <=
                     SectorStream<Card>::kMaxBlock,
                 "the header is the first block, with the first records");
@@ -89,6 +94,7 @@ class Logger {
   void take(Ring& ring, LogTime now);
   void appendHeader();
   void note(bool success);
+  [[nodiscard]] bool dead() const { return failuresInARow_ >= kMaxFailures; }
   [[nodiscard]] bool headerDone() const { return headerItem_ == LogHeader::kItems; }
 
   template <class Visitor>
@@ -107,9 +113,10 @@ class Logger {
   PeriodicTask syncTask_{periodFromHz(kLogSyncRateHz)};
   bool draining_ = false;  // the rings are being emptied
   bool syncAsked_ = false;
-  bool syncing_ = false;  // the block is closed: partial sector, then sync
-  bool paused_ = false;   // after a failure, until the next write period
-  bool stalled_ = false;  // the card keeps us waiting since stalledSince_
+  bool syncing_ = false;   // the block is closed: partial sector, then sync
+  bool settling_ = false;  // the card is busy with a sync
+  bool paused_ = false;    // after a failure, until the next write period
+  bool stalled_ = false;   // the card keeps us waiting since stalledSince_
   LogTime stalledSince_ = 0;
   std::uint32_t longestStall_ = 0;  // us
   std::uint32_t failures_ = 0;
@@ -127,7 +134,7 @@ void Logger<Card>::begin(LogTime now, const LogIdentity& identity) {
   headerItem_ = 0;
   writeTask_.start(static_cast<Micros>(now));
   syncTask_.start(static_cast<Micros>(now));
-  draining_ = syncAsked_ = syncing_ = paused_ = stalled_ = false;
+  draining_ = syncAsked_ = syncing_ = settling_ = paused_ = stalled_ = false;
   longestStall_ = failures_ = failuresInARow_ = 0;
 }
 
@@ -176,16 +183,21 @@ template <class Clock>
 bool Logger<Card>::forceWriteAndFlush(Clock&& clock, Micros budget) {
   const Micros start = clock();
   const LogTime begun = now_;
-  log(status(begun));
+  bool told = false;
   draining_ = true;
   paused_ = false;
-  while (!failed()) {
-    const bool allInStream = !draining_;
-    if (allInStream && !syncAsked_ && !syncing_) {
-      if (stream_.durable() == stream_.length()) return true;
-      syncAsked_ = true;
-    }
+  while (!dead()) {
     const Micros spent = elapsed(clock(), start);
+    if (!draining_ && !syncAsked_ && !syncing_ && !settling_) {  // all is in the stream
+      if (!told) {
+        log(status(begun + spent));  // the final count of drops: now its ring has room for it
+        draining_ = told = true;
+      } else if (stream_.durable() == stream_.length()) {
+        return true;
+      } else {
+        syncAsked_ = true;
+      }
+    }
     if (spent >= budget) return false;
     flush(begun + spent);  // keeps its rate: a card too slow for all still keeps what it took
     write(begun + spent);
@@ -196,7 +208,7 @@ bool Logger<Card>::forceWriteAndFlush(Clock&& clock, Micros budget) {
 /// At most one access to the card.
 template <class Card>
 void Logger<Card>::step(LogTime now) {
-  if (failed() || !(draining_ || syncAsked_ || syncing_)) return;
+  if (dead() || !(draining_ || syncAsked_ || syncing_ || settling_)) return;
   if (!stream_.ready()) {
     if (!stalled_) stalledSince_ = now;
     stalled_ = true;
@@ -204,7 +216,7 @@ void Logger<Card>::step(LogTime now) {
     if (wait > longestStall_) longestStall_ = wait;
     return;
   }
-  stalled_ = false;
+  stalled_ = settling_ = false;
   if (syncAsked_) {
     // A header cut short has no block end: log_block is not yet known to the reader.
     if (headerDone()) stream_.closeBlock(now);
@@ -217,8 +229,9 @@ void Logger<Card>::step(LogTime now) {
   } else if (syncing_ && stream_.partialPending()) {
     note(stream_.writePartial());
   } else if (syncing_) {
-    syncing_ = !stream_.sync();
-    note(!syncing_);
+    settling_ = stream_.sync();
+    syncing_ = !settling_;
+    note(settling_);
   } else {
     draining_ = false;  // nothing left that fills a sector
   }

@@ -116,7 +116,7 @@ class SectorStream {
     return static_cast<std::uint32_t>(sector_ * kSectorSize + staged);
   }
 
-  /// Bytes that survive a power cut.
+  /// Bytes that survive a power cut once the card is ready again.
   [[nodiscard]] std::uint32_t durable() const { return durable_; }
 
  private:

@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include <SdCard/SdioTeensy.h>
+
 namespace strix {
 
 namespace {
@@ -15,6 +17,14 @@ constexpr std::uint8_t kTransfer = DMA_SDIO;
 #else
 constexpr std::uint8_t kTransfer = FIFO_SDIO;
 #endif
+
+constexpr bool kFifo = kTransfer == FIFO_SDIO;
+
+constexpr std::uint32_t kFifoChunk = 16;   // words, the watermark that SdFat sets
+constexpr std::uint32_t kFillBound = 200;  // us; the FIFO takes a whole sector, on the wire 41 us
+constexpr std::uint32_t kTransferErrors =
+    SDHC_IRQSTAT_DMAE | SDHC_IRQSTAT_AC12E | SDHC_IRQSTAT_DEBE | SDHC_IRQSTAT_DCE |
+    SDHC_IRQSTAT_DTOE | SDHC_IRQSTAT_CIE | SDHC_IRQSTAT_CEBE | SDHC_IRQSTAT_CCE | SDHC_IRQSTAT_CTOE;
 
 constexpr char kPrefix[] = "log_";
 constexpr char kSuffix[] = ".ulg";
@@ -45,6 +55,7 @@ bool SdCard::begin() {
   if (!allocate(newest + 1)) return false;
   logNumber_ = newest + 1;
   held_ = kNone;
+  heldIsNew_ = open_ = filled_ = stopAsked_ = false;
   writable_ = true;
   return true;
 }
@@ -131,7 +142,15 @@ bool SdCard::makeValid(std::uint64_t size) {
   return file_.write(sector_.data(), sector_.size()) == sector_.size() && file_.sync();
 }
 
-bool SdCard::busy() { return writable_ && sd_.card()->isBusy(); }
+bool SdCard::busy() {
+  if (!writable_) return false;
+  if (filled_ && (SDHC_IRQSTAT & (SDHC_IRQSTAT_TC | kTransferErrors)) == 0) return true;
+  if (!filled_ && sd_.card()->isBusy()) return true;
+  if (!stopAsked_) return false;
+  stopAsked_ = open_ = false;
+  writable_ = sectorTaken() && sdio().stopTransmission(false);
+  return writable_ && sd_.card()->isBusy();
+}
 
 bool SdCard::writeSector(std::uint32_t index, const std::uint8_t (&data)[kSectorSize]) {
   if (!writable_ || index >= sectors_) return false;
@@ -140,21 +159,64 @@ bool SdCard::writeSector(std::uint32_t index, const std::uint8_t (&data)[kSector
   if (next && !flushHeld()) return false;
   std::copy(std::begin(data), std::end(data), sector_.begin());
   held_ = index;
+  heldIsNew_ = true;
+  return true;
+}
+
+bool SdCard::sync(std::uint32_t /*length*/) {
+  if (!writable_ || !flushHeld()) return false;
+  stopAsked_ = open_;
   return true;
 }
 
 bool SdCard::flushHeld() {
-  if (held_ != kNone) writable_ = sd_.card()->writeSector(firstSector_ + held_, sector_.data());
+  if (!heldIsNew_) return true;
+  const std::uint32_t sector = firstSector_ + held_;
+  if (kFifo) {
+    writable_ = (open_ || sdio().writeStart(sector)) && fillFifo();
+    open_ = writable_;
+  } else {
+    writable_ = sd_.card()->writeSector(sector, sector_.data());
+  }
+  heldIsNew_ = false;
   return writable_;
 }
 
-bool SdCard::sync(std::uint32_t /*length*/) const { return writable_; }
+/// begin started it with an SdioConfig, so it is one.
+SdioCard& SdCard::sdio() { return *static_cast<SdioCard*>(sd_.card()); }
 
-bool SdCard::finish(std::uint32_t length) {
-  if (!writable_) return false;
-  const bool written = flushHeld() && sd_.card()->syncDevice();
-  writable_ = false;
-  return written && file_.truncate(length) && file_.close();
+/// SdFat's writeData with an end to its waiting. The next sector of an open transfer follows the
+/// last one on the card.
+bool SdCard::fillFifo() {
+  if (!sectorTaken()) return false;
+  if ((SDHC_PRSSTAT & SDHC_PRSSTAT_WTA) == 0) {  // stands at the gap behind the last sector
+    SDHC_PROCTL &= ~SDHC_PROCTL_SABGREQ;
+    SDHC_PROCTL |= SDHC_PROCTL_CREQ;
+  }
+  SDHC_PROCTL |= SDHC_PROCTL_SABGREQ;  // stop again at the gap behind this one
+  const std::uint32_t start = ARM_DWT_CYCCNT;
+  const std::uint32_t limit = kFillBound * (F_CPU_ACTUAL / 1'000'000U);
+  for (std::size_t at = 0; at < kSectorSize;) {
+    while ((SDHC_PRSSTAT & SDHC_PRSSTAT_BWEN) == 0) {
+      if (ARM_DWT_CYCCNT - start > limit) return false;
+    }
+    for (std::uint32_t i = 0; i < kFifoChunk; ++i, at += sizeof(std::uint32_t)) {
+      std::uint32_t word = 0;
+      std::memcpy(&word, &sector_[at], sizeof word);
+      SDHC_DATPORT = word;
+    }
+  }
+  filled_ = true;
+  return true;
+}
+
+/// False when the card has told an error of the sector before. Not to be asked while it is busy.
+bool SdCard::sectorTaken() {
+  if (!filled_) return true;
+  filled_ = false;
+  const std::uint32_t status = SDHC_IRQSTAT;
+  SDHC_IRQSTAT = status;  // writing ones clears them
+  return (status & SDHC_IRQSTAT_TC) != 0 && (status & kTransferErrors) == 0;
 }
 
 }  // namespace strix

@@ -7,4 +7,5 @@ void runLoopTests();
 void runBadInputTests();
 void runMissionTests();
 void runNavigationUseTests();
+void runCardStallTests();
 void runHeapTests();

@@ -13,6 +13,7 @@ int main() {
   runBadInputTests();
   runMissionTests();
   runNavigationUseTests();
+  runCardStallTests();
   runHeapTests();
   UNITY_END();
   return 0;

@@ -1,12 +1,15 @@
 /// Feeds a logger as the flight software does, at full rate, and keeps count of what it gave.
 #pragma once
 
+#include <unity.h>
+
 #include <map>
 #include <string>
 #include <utility>
 
 #include "FakeCard.h"
 #include "Logger.h"
+#include "ULogReader.h"
 
 namespace strix {
 
@@ -56,6 +59,30 @@ class LogFlight {
           return static_cast<Micros>(now);
         },
         budget);
+  }
+
+  /// The file as the last sync left it, which is a sound one.
+  ULogFile readDurable() {
+    ULogFile file(card.durableFile());
+    TEST_ASSERT_EQUAL_STRING("", file.error.c_str());
+    return file;
+  }
+
+  /// Every record given is in the file, in order, or counted as dropped by the very stream.
+  void assertNothingIsMissing(const ULogFile& file) {
+    const topic::LogStatus status = logger.status(now);
+    for (const auto& [id, subscription] : file.subscriptions) {
+      if (id >= kLogStreamCount || subscription.topic == "log_status") continue;
+      const auto records = file.of(subscription.topic, subscription.instance);
+      const std::uint32_t expected = given[{subscription.topic, subscription.instance}];
+      TEST_ASSERT_EQUAL_UINT32_MESSAGE(expected - status.dropped_by_id[id], records.size(),
+                                       subscription.topic.c_str());
+      for (std::size_t i = 1; i < records.size(); ++i) {
+        TEST_ASSERT_TRUE_MESSAGE(file.value<std::uint64_t>(records[i - 1], "timestamp") <
+                                     file.value<std::uint64_t>(records[i], "timestamp"),
+                                 subscription.topic.c_str());
+      }
+    }
   }
 
  private:

@@ -5,3 +5,6 @@ void runRingBufferTests();
 void runSectorStreamTests();
 void runULogTests();
 void runCardTests();
+void runStallTests();
+void runPowerCutTests();
+void runRingTableTests();

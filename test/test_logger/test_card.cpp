@@ -4,7 +4,6 @@
 #include <random>
 
 #include "LogFlight.h"
-#include "ULogReader.h"
 #include "suites.h"
 
 using namespace strix;
@@ -12,29 +11,6 @@ using namespace strix;
 namespace {
 
 LogFlight flight;
-
-ULogFile readDurable() {
-  ULogFile file(flight.card.durableFile());
-  TEST_ASSERT_EQUAL_STRING("", file.error.c_str());
-  return file;
-}
-
-/// Every record given is in the file, in order, or counted as dropped by the very stream.
-void assertNothingIsMissing(const ULogFile& file) {
-  const topic::LogStatus status = flight.logger.status(flight.now);
-  for (const auto& [id, subscription] : file.subscriptions) {
-    if (id >= kLogStreamCount || subscription.topic == "log_status") continue;
-    const auto records = file.of(subscription.topic, subscription.instance);
-    const std::uint32_t given = flight.given[{subscription.topic, subscription.instance}];
-    TEST_ASSERT_EQUAL_UINT32_MESSAGE(given - status.dropped_by_id[id], records.size(),
-                                     subscription.topic.c_str());
-    for (std::size_t i = 1; i < records.size(); ++i) {
-      TEST_ASSERT_TRUE_MESSAGE(file.value<std::uint64_t>(records[i - 1], "timestamp") <
-                                   file.value<std::uint64_t>(records[i], "timestamp"),
-                               subscription.topic.c_str());
-    }
-  }
-}
 
 void test_a_busy_card_is_left_alone_and_a_pass_costs_at_most_one_access() {
   std::mt19937 random(3);
@@ -48,7 +24,7 @@ void test_a_busy_card_is_left_alone_and_a_pass_costs_at_most_one_access() {
   TEST_ASSERT_GREATER_THAN_UINT32(1000, flight.card.fullSectorWrites);
   TEST_ASSERT_TRUE(flight.finish(60'000'000));
   TEST_ASSERT_EQUAL_UINT32(0, flight.card.accessesWhileBusy);
-  assertNothingIsMissing(readDurable());
+  flight.assertNothingIsMissing(flight.readDurable());
 }
 
 void test_a_quick_card_loses_nothing_and_is_used_twenty_times_a_second() {
@@ -64,10 +40,10 @@ void test_a_quick_card_loses_nothing_and_is_used_twenty_times_a_second() {
   }
   TEST_ASSERT_UINT32_WITHIN(25, 200, bursts);  // a sync may split a burst in two
   TEST_ASSERT_UINT32_WITHIN(1, 20, flight.card.syncs);
-  TEST_ASSERT_UINT32_WITHIN(1, 20, readDurable().of("log_status").size());
+  TEST_ASSERT_UINT32_WITHIN(1, 20, flight.readDurable().of("log_status").size());
   TEST_ASSERT_TRUE(flight.finish(1'000'000));
   TEST_ASSERT_EQUAL_UINT32(0, flight.logger.dropped());
-  assertNothingIsMissing(readDurable());
+  flight.assertNothingIsMissing(flight.readDurable());
 }
 
 void test_a_stall_of_nearly_two_seconds_loses_nothing() {
@@ -78,7 +54,7 @@ void test_a_stall_of_nearly_two_seconds_loses_nothing() {
   TEST_ASSERT_TRUE(flight.finish(2'000'000));
   TEST_ASSERT_EQUAL_UINT32(0, flight.logger.dropped());
   TEST_ASSERT_UINT32_WITHIN(100'000, 1'850'000, flight.logger.status(0).longest_stall_us);
-  assertNothingIsMissing(readDurable());
+  flight.assertNothingIsMissing(flight.readDurable());
 }
 
 void test_a_stall_of_four_seconds_drops_what_does_not_fit_and_says_how_much() {
@@ -87,8 +63,8 @@ void test_a_stall_of_four_seconds_drops_what_does_not_fit_and_says_how_much() {
   flight.card.stallUntil(flight.now + 4'000'000);
   for (int i = 0; i < 6000; ++i) flight.pass();
   TEST_ASSERT_TRUE(flight.finish(2'000'000));
-  const ULogFile file = readDurable();
-  assertNothingIsMissing(file);
+  const ULogFile file = flight.readDurable();
+  flight.assertNothingIsMissing(file);
   // 4 s at 1000 Hz into a ring of 2000; what came in while the others were written adds nothing.
   TEST_ASSERT_UINT32_WITHIN(60, 2000, flight.logger.status(0).dropped_by_id[0]);
   const auto statuses = file.of("log_status");
@@ -104,7 +80,7 @@ void test_a_power_cut_loses_less_than_a_second() {
   for (int i = 0; i < 5000; ++i) {
     flight.pass();
     if (i < 1000 || i % 37 != 0) continue;
-    const ULogFile file = readDurable();
+    const ULogFile file = flight.readDurable();
     const auto imu = file.of("sensor_combined");
     TEST_ASSERT_GREATER_THAN_UINT64(flight.now - 1'000'000,
                                     file.value<std::uint64_t>(imu.back(), "timestamp"));
@@ -129,7 +105,7 @@ void test_an_unfinished_sector_is_written_with_zeros_behind_and_again_as_it_fill
   const std::vector<std::uint8_t> second = flight.card.durableFile();
   TEST_ASSERT_GREATER_THAN(first.size(), second.size());
   TEST_ASSERT_EQUAL_MEMORY(first.data(), second.data(), first.size());
-  TEST_ASSERT_EQUAL(1, readDurable().texts.size());
+  TEST_ASSERT_EQUAL(1, flight.readDurable().texts.size());
 }
 
 void test_the_synced_length_is_what_the_log_holds() {
@@ -160,7 +136,7 @@ void test_a_card_that_dies_is_noticed_and_the_loop_goes_on() {
   TEST_ASSERT_FALSE(flight.finish(1'000'000));
   TEST_ASSERT_EQUAL_UINT32(20, flight.logger.status(0).write_errors);
   TEST_ASSERT_GREATER_THAN_UINT32(3000, flight.logger.dropped());
-  readDurable();  // what was made durable before is still a sound file
+  flight.readDurable();  // what was made durable before is still a sound file
 }
 
 void test_a_card_that_fails_for_a_while_loses_nothing() {
@@ -174,7 +150,7 @@ void test_a_card_that_fails_for_a_while_loses_nothing() {
   TEST_ASSERT_FALSE(flight.logger.failed());
   TEST_ASSERT_UINT32_WITHIN(1, 6, flight.logger.status(0).write_errors);
   TEST_ASSERT_EQUAL_UINT32(0, flight.logger.dropped());
-  assertNothingIsMissing(readDurable());
+  flight.assertNothingIsMissing(flight.readDurable());
 }
 
 void test_failures_with_successes_between_do_not_add_up() {
@@ -201,7 +177,7 @@ void test_a_refused_sync_is_counted_and_tried_again() {
   for (int i = 0; i < 60; ++i) flight.pass();
   TEST_ASSERT_GREATER_THAN_UINT32(durable, flight.card.syncedLength);
   TEST_ASSERT_TRUE(flight.finish(1'000'000));
-  assertNothingIsMissing(readDurable());
+  flight.assertNothingIsMissing(flight.readDurable());
 }
 
 void test_the_longest_stall_is_told_not_the_last() {
@@ -219,7 +195,7 @@ void test_saving_ends_with_the_final_count_of_drops() {
   TEST_ASSERT_TRUE(flight.finish(1'000'000));
   for (int i = 0; i < 2500; ++i) flight.logger.logIMU({});
   TEST_ASSERT_TRUE(flight.finish(400'000));
-  const ULogFile file = readDurable();
+  const ULogFile file = flight.readDurable();
   TEST_ASSERT_EQUAL_UINT32(500, file.value<std::uint32_t>(file.of("log_status").back(), "dropped"));
 }
 
@@ -244,14 +220,14 @@ void test_saving_gives_up_at_its_deadline_and_keeps_what_it_saved() {
   // A sync each 0.5 s: at most so much, 25 sectors, and what came on top of it is not durable.
   TEST_ASSERT_GREATER_THAN_UINT32(flight.card.sectors().size() - 30 * kSectorSize,
                                   flight.card.syncedLength);
-  readDurable();
+  flight.readDurable();
 }
 
 void test_what_replay_recomputes_is_thinned_and_inputs_are_not() {
   flight.begin(0);
   for (int i = 0; i < 1000; ++i) flight.pass();
   TEST_ASSERT_TRUE(flight.finish(1'000'000));
-  const ULogFile file = readDurable();
+  const ULogFile file = flight.readDurable();
   TEST_ASSERT_EQUAL(1000, file.of("sensor_combined").size());
   TEST_ASSERT_EQUAL(500, file.of("control_tick").size());
   TEST_ASSERT_EQUAL(100, file.of("vehicle_local_position").size());
@@ -267,11 +243,11 @@ void test_a_second_log_starts_anew_even_after_a_failure() {
   flight.begin(9'000'000);
   flight.pass();
   TEST_ASSERT_TRUE(flight.finish(1'000'000));
-  const ULogFile file = readDurable();
+  const ULogFile file = flight.readDurable();
   TEST_ASSERT_EQUAL_UINT64(9'000'000, file.start);
   TEST_ASSERT_EQUAL(1, file.of("sensor_combined").size());
   TEST_ASSERT_EQUAL(0, file.texts.size());
-  assertNothingIsMissing(file);
+  flight.assertNothingIsMissing(file);
 }
 
 }  // namespace

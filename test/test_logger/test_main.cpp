@@ -11,6 +11,9 @@ int main() {
   runSectorStreamTests();
   runULogTests();
   runCardTests();
+  runStallTests();
+  runPowerCutTests();
+  runRingTableTests();
   UNITY_END();
   return 0;
 }
