@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, ParamSpec
+from typing import Annotated
 
 import typer
 
-from strix.errors import BadInput
+from strix.log.cli import log_app
+from strix.log.command import says_what_is_wrong
 
 app = typer.Typer(
     name="strix",
@@ -21,21 +20,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-P = ParamSpec("P")
-
-
-def says_what_is_wrong(command: Callable[P, None]) -> Callable[P, None]:
-    """Bad input ends in one line on stderr and status 2, never in a traceback."""
-
-    @functools.wraps(command)
-    def run(*args: P.args, **kwargs: P.kwargs) -> None:
-        try:
-            command(*args, **kwargs)
-        except BadInput as error:
-            print(f"strix: {error}", file=sys.stderr)
-            raise typer.Exit(2) from None
-
-    return run
+app.add_typer(log_app, name="log")
 
 
 @app.callback()
