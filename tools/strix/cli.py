@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from strix.log import cli_view
 from strix.log.cli import log_app
 from strix.log.command import says_what_is_wrong
 
@@ -21,6 +22,7 @@ app = typer.Typer(
 )
 
 app.add_typer(log_app, name="log")
+app.command(epilog="Example: strix convert out/flight.ulg -o flight.mcap")(cli_view.convert)
 
 
 @app.callback()

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from strix.log import cli_view
 from strix.log.command import reading, says_what_is_wrong
 
 log_app = typer.Typer(
@@ -56,3 +57,12 @@ def recover(
     with reading(file) as progress:
         done = library.recover(file, out, header_from, force, progress)
     library.print_recovery(done)
+
+
+log_app.command(epilog="Example: strix log info out/flight.ulg")(cli_view.info)
+log_app.command(epilog="Example: strix log tail out/flight.ulg vehicle_attitude -n 5")(
+    cli_view.tail
+)
+log_app.command(epilog="Example: strix log plot out/flight.ulg vehicle_local_position.z -o z.png")(
+    cli_view.plot
+)
