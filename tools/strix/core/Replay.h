@@ -70,15 +70,15 @@ class Replay {
   ReplayResult run(bool compare) {
     ReplayResult result;
     const topic::FlightConfig& chosen = flightConfigOf(log_);
-    const std::uint64_t limit = firstGap(result);
+    const std::uint64_t limit = firstGap();
     board_.setTime(static_cast<Micros>(chosen.timestamp));
     board_.setDevices(devicesOf(chosen));
     result.begin = chosen.timestamp;
     result.logEnd = log_.records<topic::ControlTick>().back().timestamp;
     software_.setup();
     for (;;) {
-      const std::uint64_t time = std::min({imu_.time(), mag_.time(), alt_.time(), gps_.time(),
-                                           tick_.time()});
+      const std::uint64_t time =
+          std::min({imu_.time(), mag_.time(), alt_.time(), gps_.time(), tick_.time()});
       if (time == UINT64_MAX) break;
       if (time >= limit) {
         result.gap = true;
@@ -90,8 +90,8 @@ class Replay {
       const bool ticked = software_.lastTick().timestamp == time;
       if (logged == nullptr && !ticked) continue;
       ++result.ticks;
-      const bool same = logged != nullptr && ticked &&
-                        logged->state_hash == software_.lastTick().state_hash;
+      const bool same =
+          logged != nullptr && ticked && logged->state_hash == software_.lastTick().state_hash;
       if (same || result.firstBad != 0) continue;
       result.firstBad = time;
       result.field = logged == nullptr ? "a control tick that the log has not"
@@ -126,12 +126,12 @@ class Replay {
   }
 
   /// Time up to which no input is missing: of the last status that has lost none.
-  [[nodiscard]] std::uint64_t firstGap(const ReplayResult& /*result*/) const {
+  [[nodiscard]] std::uint64_t firstGap() const {
     std::uint64_t sound = 0;
     for (const topic::LogStatus& status : log_.records<topic::LogStatus>()) {
       const auto lost = [&status](std::size_t id) { return status.dropped_by_id[id] != 0; };
-      if (lost(logStreamId<topic::SensorCombined, 0>()) || lost(logStreamId<topic::SensorMag, 0>()) ||
-          lost(logStreamId<topic::SensorBaro, 0>()) ||
+      if (lost(logStreamId<topic::SensorCombined, 0>()) ||
+          lost(logStreamId<topic::SensorMag, 0>()) || lost(logStreamId<topic::SensorBaro, 0>()) ||
           lost(logStreamId<topic::VehicleGpsPosition, 0>()) ||
           lost(logStreamId<topic::ManualControlSwitches, 0>()) ||
           lost(logStreamId<topic::ControlTick, 0>())) {

@@ -15,8 +15,8 @@ namespace {
 using strix::FlightLogReader;
 
 strix::Mission missionOf(const FlightLogReader& log, const strix::topic::FlightConfig& chosen) {
-  strix::Mission mission{"replayed", chosen.takeoff_height, chosen.takeoff_hold, chosen.leg_count,
-                         {}};
+  strix::Mission mission{
+      "replayed", chosen.takeoff_height, chosen.takeoff_hold, chosen.leg_count, {}};
   const auto& legs = log.records<strix::topic::MissionLeg>();
   if (legs.size() < mission.legCount || mission.legCount > strix::Mission::kMaxLegs) {
     log.refuse(std::to_string(mission.legCount) + " legs of the mission",
@@ -43,7 +43,7 @@ template <int States>
 strix::ReplayResult run(const FlightLogReader& log, const strix::FlightSoftwareConfig& config,
                         const std::string& out, bool compare) {
   auto replay = std::make_unique<strix::Replay<States>>(log, config, out);
-  const strix::ReplayResult result = replay->run(compare);
+  strix::ReplayResult result = replay->run(compare);
   if (!out.empty() && !replay->close()) {
     throw std::invalid_argument(out + ": could not be written to its end");
   }
@@ -83,8 +83,9 @@ void bindReplay(nb::module_& m) {
   nb::class_<FlightLogReader>(m, "FlightLogReader", "The inputs and control ticks of a flight log")
       .def(nb::init<const std::string&>(), "path"_a)
       .def("info", &FlightLogReader::info, "key"_a);
-  m.def("replayNavigation", [](const FlightLogReader& log) { return configOf(log).navigation; },
-        "log"_a, "The navigation's configuration that flew, to be changed and given to replay()");
+  m.def(
+      "replayNavigation", [](const FlightLogReader& log) { return configOf(log).navigation; },
+      "log"_a, "The navigation's configuration that flew, to be changed and given to replay()");
   m.def("replay", &replay, "log"_a, "navigation"_a.none(), "states"_a, "gains"_a.none(), "out"_a,
         "compare"_a, "The logged inputs through the flight software");
 }
