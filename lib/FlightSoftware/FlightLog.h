@@ -74,7 +74,7 @@ template <int States>
 }
 
 template <int States>
-[[nodiscard]] topic::EstimatorStatus toRecord(LogTime time, const Navigation<States>& navigation) {
+[[nodiscard]] topic::EstimatorHealth toRecord(LogTime time, const Navigation<States>& navigation) {
   return {time, navigation.health(), navigation.restarts(), navigation.readmissions(),
           navigation.vibration()};
 }

@@ -74,7 +74,7 @@ using LogStreams = std::tuple<
     LogStream<topic::VehicleLocalPosition,   0,     500,         5,      2000>,
     LogStream<topic::EstimatorStd,           0,      50,         1,      2000>,
     LogStream<topic::EstimatorSensorBias,    0,      10,         1,      2000>,
-    LogStream<topic::EstimatorStatus,        0,      10,         1,      2000>,
+    LogStream<topic::EstimatorHealth,        0,      10,         1,      2000>,
     LogStream<topic::EstimatorAidSource,     0,    1000,        10,      2000>,  // tilt
     LogStream<topic::EstimatorAidSource,     1,     100,         1,      2000>,  // magnetometer
     LogStream<topic::EstimatorAidSource,     2,      50,         1,      2000>,  // altimeter

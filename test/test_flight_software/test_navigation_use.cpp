@@ -198,7 +198,7 @@ void test_each_sickness_of_the_filter_is_said_once_and_refuses_arming_if_it_is_g
     TEST_ASSERT_FALSE_MESSAGE(flight.arm(), said);  // of a dead sensor too, each for its own reason
     const bool grave = (health::kNoArming & sickness.bit) != 0;
     TEST_ASSERT_EQUAL_MESSAGE(grave, flight.logSays(firstRefusal(prearm::kEstimator)), said);
-    const auto status = recorded<topic::EstimatorStatus>(flight);
+    const auto status = recorded<topic::EstimatorHealth>(flight);
     TEST_ASSERT_TRUE_MESSAGE((status.back().filter_fault_flags & sickness.bit) != 0, said);
     tested |= sickness.bit;
   }
@@ -247,10 +247,10 @@ void test_status_and_biases_of_the_filter_are_in_the_log_ten_times_a_second() {
   flight.getReady();
   flight.board.gyroBias += Vector3f(0.002F, -0.001F, 0.0015F);  // what the calibration missed
   flight.board.hold(kNorthEast);
-  const std::size_t before = recorded<topic::EstimatorStatus>(flight).size();
+  const std::size_t before = recorded<topic::EstimatorHealth>(flight).size();
   flight.run(20.0F);
   const ESKF<18>& filter = flight.software.estimator();
-  const auto status = recorded<topic::EstimatorStatus>(flight);
+  const auto status = recorded<topic::EstimatorHealth>(flight);
   const auto biases = recorded<topic::EstimatorSensorBias>(flight);
   TEST_ASSERT_EQUAL(200, status.size() - before);
   TEST_ASSERT_EQUAL(status.size(), biases.size());
@@ -271,7 +271,7 @@ void test_status_and_biases_of_the_filter_are_in_the_log_ten_times_a_second() {
   }
   strike(flight, kOverflow);
   flight.run(0.2F);
-  const topic::EstimatorStatus last = recorded<topic::EstimatorStatus>(flight).back();
+  const topic::EstimatorHealth last = recorded<topic::EstimatorHealth>(flight).back();
   TEST_ASSERT_EQUAL_HEX32(flight.software.navigation().health(), last.filter_fault_flags);
   TEST_ASSERT_EQUAL(1, last.reset_count);
   TEST_ASSERT_EQUAL(2, last.readmissions);
@@ -287,7 +287,7 @@ void test_vibration_is_in_the_log() {
   }
   flight.run(0.1F);
   // Its mean takes 1 s: after 1.5 s of shaking 1 - e^-1.5 = 0.78 of the square is there.
-  TEST_ASSERT_FLOAT_WITHIN(0.3F, 1.7F, recorded<topic::EstimatorStatus>(flight).back().vibration);
+  TEST_ASSERT_FLOAT_WITHIN(0.3F, 1.7F, recorded<topic::EstimatorHealth>(flight).back().vibration);
 }
 
 }  // namespace
