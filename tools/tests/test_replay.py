@@ -178,6 +178,19 @@ def test_what_is_no_flight_log_is_refused(flight: Path, tmp_path: Path) -> None:
         replay(other)
 
 
+def test_a_subscription_with_an_impossible_id_is_no_subscription(
+    flight: Path, tmp_path: Path
+) -> None:
+    content = bytearray(flight.read_bytes())
+    for message in messages(bytes(content)):
+        if message.type == "A" and message.body[3:] == b"flight_config":
+            struct.pack_into("<H", content, message.at + 4, 65535)
+    other = tmp_path / "id.ulg"
+    other.write_bytes(content)
+    with pytest.raises(BadInput, match="expected a flight log from its beginning"):
+        replay(other)
+
+
 def test_a_log_cut_anywhere_replays_as_far_as_it_goes_or_is_refused(
     flight: Path, tmp_path: Path
 ) -> None:

@@ -81,7 +81,7 @@ class LogReader {
 
   template <class Topic>
   void subscribe(std::uint16_t id, const std::string& name) {
-    if (name != kTopicName<Topic>) return;
+    if (name != kTopicName<Topic> || id >= takers_.size()) return;
     if (formats_[name] != TopicFormat<Topic>::kText) {
       refuse("the topic " + name + " as this software writes it (" +
                  std::string(TopicFormat<Topic>::kText) + ")",
