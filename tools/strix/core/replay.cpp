@@ -29,14 +29,15 @@ strix::Mission missionOf(const FlightLogReader& log, const strix::topic::FlightC
 }
 
 /// The configuration that flew, as this build of the software has it.
-strix::FlightSoftwareConfig configOf(const FlightLogReader& log) {
+/// @param gains  others than those that flew, or null
+strix::FlightSoftwareConfig configOf(const FlightLogReader& log, const strix::Gains* gains) {
   const strix::topic::FlightConfig& chosen = strix::Replay<18>::flightConfigOf(log);
   const strix::Airframe* airframe = strix::findAirframe(log.info("vehicle"));
   if (airframe == nullptr) {
     log.refuse("a vehicle of include/vehicles", "'" + log.info("vehicle") + "'");
   }
-  return strix::flightConfig(airframe->vehicle, airframe->gains, missionOf(log, chosen),
-                             chosen.declination);
+  return strix::flightConfig(airframe->vehicle, gains == nullptr ? airframe->gains : *gains,
+                             missionOf(log, chosen), chosen.declination);
 }
 
 template <int States>
@@ -56,13 +57,10 @@ strix::ReplayResult replay(const FlightLogReader& log,
                            const std::optional<strix::NavigationConfig>& navigation, int states,
                            const std::optional<GainRows>& gains, const std::string& out,
                            bool compare) {
-  strix::FlightSoftwareConfig chosen = configOf(log);
-  strix::Gains other = chosen.gains;
-  if (gains) other.k = *gains;
-  strix::FlightSoftwareConfig config{chosen.vehicle, other, chosen.mission};
-  config.sensors = chosen.sensors;
-  config.navigation = navigation.value_or(chosen.navigation);
-  config.declination = chosen.declination;
+  std::optional<strix::Gains> other;
+  if (gains) other = strix::Gains{"replayed", *gains};
+  strix::FlightSoftwareConfig config = configOf(log, other ? &*other : nullptr);
+  if (navigation) config.navigation = *navigation;
   const nb::gil_scoped_release unlocked;
   return states == 9 ? run<9>(log, config, out, compare) : run<18>(log, config, out, compare);
 }
@@ -84,8 +82,9 @@ void bindReplay(nb::module_& m) {
       .def(nb::init<const std::string&>(), "path"_a)
       .def("info", &FlightLogReader::info, "key"_a);
   m.def(
-      "replayNavigation", [](const FlightLogReader& log) { return configOf(log).navigation; },
-      "log"_a, "The navigation's configuration that flew, to be changed and given to replay()");
+      "replayNavigation",
+      [](const FlightLogReader& log) { return configOf(log, nullptr).navigation; }, "log"_a,
+      "The navigation's configuration that flew, to be changed and given to replay()");
   m.def("replay", &replay, "log"_a, "navigation"_a.none(), "states"_a, "gains"_a.none(), "out"_a,
         "compare"_a, "The logged inputs through the flight software");
 }
