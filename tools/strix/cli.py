@@ -9,9 +9,9 @@ from typing import Annotated
 
 import typer
 
+from strix.command import says_what_is_wrong
 from strix.log import cli_view
 from strix.log.cli import log_app
-from strix.log.command import says_what_is_wrong
 
 app = typer.Typer(
     name="strix",

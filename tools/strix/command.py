@@ -1,4 +1,4 @@
-"""What every command of `strix log` does: refuse bad input in one line, show long work."""
+"""What every command does: refuse bad input in one line, show long work."""
 
 from __future__ import annotations
 

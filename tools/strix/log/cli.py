@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
+from strix.command import reading, says_what_is_wrong
 from strix.log import cli_view
-from strix.log.command import reading, says_what_is_wrong
 
 log_app = typer.Typer(
     name="log",

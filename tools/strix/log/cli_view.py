@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from strix.log.command import reading, says_what_is_wrong
+from strix.command import reading, says_what_is_wrong
 
 LogFile = Annotated[Path, typer.Argument(help="A log: .ulg, or Ugglan's data log")]
 
