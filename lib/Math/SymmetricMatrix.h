@@ -15,16 +15,13 @@ namespace strix {
 /// For what must melt into its caller, so that indices become constants there.
 #define STRIX_INLINE __attribute__((always_inline))
 
-/// Calls f(0), f(1), ... f(Count - 1), each number as a type that converts to it: a loop whose
-/// index is a constant in every turn.
-template <int Count, class Function>
-STRIX_INLINE inline void unrolled(Function&& f);
-
 template <class Function, int... I>
 STRIX_INLINE inline void unrolledOver(std::integer_sequence<int, I...>, Function&& f) {
   (f(std::integral_constant<int, I>{}), ...);
 }
 
+/// Calls f(0), f(1), ... f(Count - 1), each number as a type that converts to it: a loop whose
+/// index is a constant in every turn.
 template <int Count, class Function>
 STRIX_INLINE inline void unrolled(Function&& f) {
   unrolledOver(std::make_integer_sequence<int, Count>{}, f);

@@ -116,8 +116,7 @@ class Navigation {
   NavigationHealth health_ = health::kNone;
   std::uint32_t restarts_ = 0;
   Micros restarted_ = 0;
-  Vector3f rate_ = Vector3f::Zero();  ///< rad/s, body, of the last sample
-  float meanSquareVelocity_ = 0.0F;   ///< (m/s)^2, each axis, while GPS aided
+  float meanSquareVelocity_ = 0.0F;  ///< (m/s)^2, each axis, while GPS aided
   Micros lastSample_ = 0;
   Micros lastMag_ = 0;
   Micros fieldTrusted_ = 0;
@@ -165,7 +164,6 @@ void Navigation<States>::predict(const Vector3f& accel, const Vector3f& gyro, Mi
   standstill_.update(now, accel, gyro);
   vibration_.update(now, accel);
   lastSample_ = now;
-  rate_ = after.rateBody;
 }
 
 /// Fast turns show the gyro's scale error, which GPS and field can mend. Bounded motion cannot: it
@@ -204,11 +202,12 @@ void Navigation<States>::updateMagMeas(const Vector3f& mag, Micros now) {
   lastMag_ = now;
   const Vector3f field =
       motors_ == MotorState::Hover ? Vector3f(mag - config_.magHoverOffset) : mag;
+  const Vector3f& rate = filter_.state().rateBody;
   float inflation = factor(config_.magWithMotors);
   if (inflation > 0.0F) complementary_.updateHeading(field, dt);
   if (config_.trackField) {
     const Vector3f fieldNed = rotateToNed(filter_.state().attitude, field - filter_.magBias());
-    if (field_.update(fieldNed, rate_.norm(), dt)) {
+    if (field_.update(fieldNed, rate.norm(), dt)) {
       fieldTrusted_ = now;
     } else {
       // Long refused, it may be that what is tracked is wrong: better a little of it than none.
@@ -217,7 +216,7 @@ void Navigation<States>::updateMagMeas(const Vector3f& mag, Micros now) {
   }
   // Lag, clock and scale errors of the field grow with the rate at which it turns.
   if (config_.magFusion == MagFusion::HeadingOnly) {
-    inflation *= 1.0F + rate_.squaredNorm() / square(config_.headingRate);
+    inflation *= 1.0F + rate.squaredNorm() / square(config_.headingRate);
   }
   filter_.updateMagMeas(field, now, inflation);
   if (filter_.magInnovation().anyAccepted()) {
@@ -364,7 +363,7 @@ VehicleState Navigation<States>::state() const {
   if (healthy()) return filter_.state();
   VehicleState fallback = lastGood_;
   fallback.attitude = complementary_.attitude();
-  fallback.rateBody = rate_;
+  fallback.rateBody = filter_.state().rateBody;
   return fallback;
 }
 
