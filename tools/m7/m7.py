@@ -85,23 +85,31 @@ def include_flags() -> list[str]:
     return [*(f"-I{folder}" for folder in ours), "-isystem", str(eigen)]
 
 
-def build(sources: Sequence[Path], folder: Path, flags: Sequence[str] = ()) -> Path:
+def build(
+    sources: Sequence[Path],
+    folder: Path,
+    flags: Sequence[str] = (),
+    last: Sequence[str] = (),
+    link: Sequence[str] = (),
+) -> Path:
     """Compile and link; return the ELF file, named after the first source.
 
     The folder, made if need be, also gets one object file per source and the linker's map.
     @param flags  come before all others, so that an -I of theirs is searched first
+    @param last  come after all others, to take back one of them
+    @param link  more for the linker
     """
     require_tools()
     folder.mkdir(parents=True, exist_ok=True)
     objects = []
     for source in (*sources, HERE / "startup.cpp"):
         target = object_of(source, folder)
-        options = [*flags, *compile_flags(), *include_flags()]
+        options = [*flags, *compile_flags(), *include_flags(), *last]
         must([CXX, *options, "-c", str(source), "-o", str(target)])
         objects.append(str(target))
     elf = folder / f"{sources[0].stem}.elf"
     script = ["-T", str(HERE / "mps2-an500.ld"), f"-Wl,-Map={elf.with_suffix('.map')}"]
-    must([CXX, *PROCESSOR, *objects, *LINK, *script, "-o", str(elf)])
+    must([CXX, *PROCESSOR, *objects, *LINK, *script, *link, "-o", str(elf)])
     return elf
 
 
@@ -116,14 +124,15 @@ def calls_outside(object_file: Path) -> set[str]:
     return {line.split()[0] for line in lines}
 
 
-def run(elf: Path, timeout_s: float = 60.0) -> Run:
-    """Run a program to its end, or to the timeout.
+def run(elf: Path, arguments: Sequence[str] = (), timeout_s: float = 60.0) -> Run:
+    """Run a program to its end, or to the timeout. No argument may have a space in it.
 
     A processor fault gives status 99 and a line that says so, the timeout status 124.
     """
     require_tools()
     command = [QEMU, "-M", "mps2-an500", "-nographic", "-monitor", "none", "-serial", "none"]
-    command += ["-semihosting-config", "enable=on,target=native"]
+    words = "".join(f",arg={word}" for word in (elf.name, *arguments))
+    command += ["-semihosting-config", f"enable=on,target=native{words}"]
     # One instruction lasts 2^10 ns of emulated time: see InstructionCounter.h.
     command += ["-icount", "shift=10,align=off,sleep=off", "-kernel", str(elf)]
     try:

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <deque>
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -44,8 +45,8 @@ class LogReader {
   }
 
   template <class Topic>
-  [[nodiscard]] const std::vector<Topic>& records() const {
-    return std::get<std::vector<Topic>>(records_);
+  [[nodiscard]] const std::deque<Topic>& records() const {
+    return std::get<std::deque<Topic>>(records_);
   }
   /// An info of the header, such as "vehicle"; empty if there is none.
   [[nodiscard]] std::string info(const std::string& key) const {
@@ -91,7 +92,7 @@ class LogReader {
       if (body.size() != 2 + kPayloadSize<Topic>) return;
       Topic record{};
       std::memcpy(static_cast<void*>(&record), &body[2], kPayloadSize<Topic>);
-      std::get<std::vector<Topic>>(reader.records_).push_back(record);
+      std::get<std::deque<Topic>>(reader.records_).push_back(record);
     };
   }
 
@@ -105,7 +106,7 @@ class LogReader {
   using Taker = void (*)(LogReader&, const Body&);
 
   std::string path_;
-  std::tuple<std::vector<Topics>...> records_;
+  std::tuple<std::deque<Topics>...> records_;  // no spare room: read on a 16 MB machine too
   std::map<std::string, std::string> formats_;
   std::map<std::string, std::string> infos_;
   std::array<Taker, kLogStreamCount + 16> takers_{};

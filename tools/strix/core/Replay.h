@@ -20,6 +20,7 @@ struct ReplayResult {
   std::uint64_t end = 0;       ///< of the last pass
   std::uint64_t logEnd = 0;    ///< of the log
   std::uint32_t ticks = 0;     ///< control ticks compared
+  std::uint32_t digest = 0;    ///< of the replayed ticks' hashes: equal when two runs are
   std::uint64_t firstBad = 0;  ///< time of the first tick that differs; 0: none
   std::string field;           ///< in which it differs first
   bool gap = false;            ///< ended where the log has lost inputs
@@ -49,14 +50,53 @@ class Cursor {
   }
 
  private:
-  const std::vector<Topic>& records_;
+  const std::deque<Topic>& records_;
   std::size_t next_ = 0;
 };
 
+/// The configuration that flew, which a flight log begins with.
+[[nodiscard]] inline const topic::FlightConfig& loggedConfig(const FlightLogReader& log) {
+  const auto& records = log.records<topic::FlightConfig>();
+  if (records.empty() || log.records<topic::ControlTick>().empty()) {
+    log.refuse("a flight log from its beginning on, with flight_config and control_tick",
+               "none of them");
+  }
+  return records.front();
+}
+
+[[nodiscard]] inline Mission loggedMission(const FlightLogReader& log) {
+  const topic::FlightConfig& chosen = loggedConfig(log);
+  Mission mission{"replayed", chosen.takeoff_height, chosen.takeoff_hold, chosen.leg_count, {}};
+  const auto& legs = log.records<topic::MissionLeg>();
+  if (legs.size() < mission.legCount || mission.legCount > Mission::kMaxLegs) {
+    log.refuse(std::to_string(mission.legCount) + " legs of the mission",
+               std::to_string(legs.size()));
+  }
+  for (std::size_t i = 0; i < mission.legCount; ++i) {
+    mission.legs[i] = {legs[i].north, legs[i].east, legs[i].height, legs[i].turn, legs[i].hold};
+  }
+  return mission;
+}
+
+/// What flew, as this build of the software has it.
+/// @param gains  others than those that flew, or null
+[[nodiscard]] inline FlightSoftwareConfig replayConfig(const FlightLogReader& log,
+                                                       const Gains* gains = nullptr) {
+  const Airframe* airframe = findAirframe(log.info("vehicle"));
+  if (airframe == nullptr) {
+    log.refuse("a vehicle of include/vehicles", "'" + log.info("vehicle") + "'");
+  }
+  return flightConfig(airframe->vehicle, gains == nullptr ? airframe->gains : *gains,
+                      loggedMission(log), loggedConfig(log).declination);
+}
+
 /// @tparam States  of the navigation filter
-template <int States>
+/// @tparam Card  takes the replay's own log
+template <int States, class Card = FileCard>
 class Replay {
  public:
+  using Software = FlightSoftware<SimulatedBoard<Card>, States>;
+
   /// @param config  what is flown; the log's own configuration, or another to see what it would do
   /// @param logPath  where the replay writes its own log; empty: nowhere
   Replay(const FlightLogReader& log, const FlightSoftwareConfig& config, const std::string& logPath)
@@ -68,8 +108,15 @@ class Replay {
 
   /// @param compare  stop at the first control tick whose hash is not the logged one
   ReplayResult run(bool compare) {
+    return run(compare, [](Software& software) { software.loop(); });
+  }
+
+  /// @param pass  makes one pass of the software: calls its loop(), and may look around it
+  template <class Pass>
+  ReplayResult run(bool compare, Pass&& pass) {
     ReplayResult result;
-    const topic::FlightConfig& chosen = flightConfigOf(log_);
+    StateHash digest;
+    const topic::FlightConfig& chosen = loggedConfig(log_);
     const std::uint64_t limit = firstGap();
     board_.setTime(static_cast<Micros>(chosen.timestamp));
     board_.setDevices(devicesOf(chosen));
@@ -84,12 +131,15 @@ class Replay {
         result.gap = true;
         break;
       }
-      pass(time);
+      give(time);
+      pass(software_);
       result.end = time;
       const topic::ControlTick* logged = tick_.take(time);
       const bool ticked = software_.lastTick().timestamp == time;
       if (logged == nullptr && !ticked) continue;
       ++result.ticks;
+      digest.add(software_.lastTick().state_hash);
+      result.digest = digest.value();
       const bool same =
           logged != nullptr && ticked && logged->state_hash == software_.lastTick().state_hash;
       if (same || result.firstBad != 0) continue;
@@ -106,15 +156,6 @@ class Replay {
   bool close() {
     Micros clock = board_.micros();
     return software_.logger().forceWriteAndFlush([&clock] { return clock++; }, 10'000'000);
-  }
-
-  static const topic::FlightConfig& flightConfigOf(const FlightLogReader& log) {
-    const auto& records = log.records<topic::FlightConfig>();
-    if (records.empty() || log.records<topic::ControlTick>().empty()) {
-      log.refuse("a flight log from its beginning on, with flight_config and control_tick",
-                 "none of them");
-    }
-    return records.front();
   }
 
  private:
@@ -142,7 +183,8 @@ class Replay {
     return UINT64_MAX;
   }
 
-  void pass(std::uint64_t time) {
+  /// Sets the board to this time with what was read then.
+  void give(std::uint64_t time) {
     board_.setTime(static_cast<Micros>(time));
     if (const auto* r = imu_.take(time)) {
       board_.put(ImuRaw{static_cast<Micros>(r->timestamp_sample), toVector(r->accelerometer_m_s2),
@@ -162,7 +204,6 @@ class Replay {
       const auto* r = switches_.take(switches_.time());
       board_.setPilot({r->arm_switch == 1, r->kill_switch == 1, r->start_switch == 1});
     }
-    software_.loop();
   }
 
   [[nodiscard]] static Vector3f toVector(const std::array<float, 3>& v) {
@@ -192,8 +233,8 @@ class Replay {
   }
 
   const FlightLogReader& log_;
-  SimulatedBoard board_;
-  FlightSoftware<SimulatedBoard, States> software_;
+  SimulatedBoard<Card> board_;
+  Software software_;
   Cursor<topic::SensorCombined> imu_{log_};
   Cursor<topic::SensorMag> mag_{log_};
   Cursor<topic::SensorBaro> alt_{log_};

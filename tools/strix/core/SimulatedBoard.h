@@ -10,9 +10,11 @@
 
 namespace strix {
 
+/// @tparam LogCard  the log's block device, made from the path of its file
+template <class LogCard = FileCard>
 class SimulatedBoard {
  public:
-  using Card = FileCard;
+  using Card = LogCard;
   static constexpr const char* kName = "simulator";
 
   SimulatedBoard(const std::string& logPath, std::uint32_t bootId)
@@ -53,7 +55,7 @@ class SimulatedBoard {
     return true;
   }
 
-  FileCard card_;
+  Card card_;
   std::uint32_t bootId_;
   Micros now_ = 0;
   SensorSet devices_{true, true, true, true, true};

@@ -114,8 +114,8 @@ class Flight {
   [[nodiscard]] const strix::VehicleState& state() const { return software_.estimator().state(); }
 
   std::string missionName_;  // the mission keeps a pointer to it
-  strix::SimulatedBoard board_;
-  strix::FlightSoftware<strix::SimulatedBoard> software_;
+  strix::SimulatedBoard<> board_;
+  strix::FlightSoftware<strix::SimulatedBoard<>> software_;
 };
 
 }  // namespace

@@ -14,32 +14,6 @@ namespace {
 
 using strix::FlightLogReader;
 
-strix::Mission missionOf(const FlightLogReader& log, const strix::topic::FlightConfig& chosen) {
-  strix::Mission mission{
-      "replayed", chosen.takeoff_height, chosen.takeoff_hold, chosen.leg_count, {}};
-  const auto& legs = log.records<strix::topic::MissionLeg>();
-  if (legs.size() < mission.legCount || mission.legCount > strix::Mission::kMaxLegs) {
-    log.refuse(std::to_string(mission.legCount) + " legs of the mission",
-               std::to_string(legs.size()));
-  }
-  for (std::size_t i = 0; i < mission.legCount; ++i) {
-    mission.legs[i] = {legs[i].north, legs[i].east, legs[i].height, legs[i].turn, legs[i].hold};
-  }
-  return mission;
-}
-
-/// The configuration that flew, as this build of the software has it.
-/// @param gains  others than those that flew, or null
-strix::FlightSoftwareConfig configOf(const FlightLogReader& log, const strix::Gains* gains) {
-  const strix::topic::FlightConfig& chosen = strix::Replay<18>::flightConfigOf(log);
-  const strix::Airframe* airframe = strix::findAirframe(log.info("vehicle"));
-  if (airframe == nullptr) {
-    log.refuse("a vehicle of include/vehicles", "'" + log.info("vehicle") + "'");
-  }
-  return strix::flightConfig(airframe->vehicle, gains == nullptr ? airframe->gains : *gains,
-                             missionOf(log, chosen), chosen.declination);
-}
-
 template <int States>
 strix::ReplayResult run(const FlightLogReader& log, const strix::FlightSoftwareConfig& config,
                         const std::string& out, bool compare) {
@@ -59,7 +33,7 @@ strix::ReplayResult replay(const FlightLogReader& log,
                            bool compare) {
   std::optional<strix::Gains> other;
   if (gains) other = strix::Gains{"replayed", *gains};
-  strix::FlightSoftwareConfig config = configOf(log, other ? &*other : nullptr);
+  strix::FlightSoftwareConfig config = strix::replayConfig(log, other ? &*other : nullptr);
   if (navigation) config.navigation = *navigation;
   const nb::gil_scoped_release unlocked;
   return states == 9 ? run<9>(log, config, out, compare) : run<18>(log, config, out, compare);
@@ -75,6 +49,7 @@ void bindReplay(nb::module_& m) {
       .def_ro("end", &ReplayResult::end)
       .def_ro("logEnd", &ReplayResult::logEnd)
       .def_ro("ticks", &ReplayResult::ticks)
+      .def_ro("digest", &ReplayResult::digest)
       .def_ro("firstBad", &ReplayResult::firstBad)
       .def_ro("field", &ReplayResult::field)
       .def_ro("gap", &ReplayResult::gap);
@@ -83,7 +58,7 @@ void bindReplay(nb::module_& m) {
       .def("info", &FlightLogReader::info, "key"_a);
   m.def(
       "replayNavigation",
-      [](const FlightLogReader& log) { return configOf(log, nullptr).navigation; }, "log"_a,
+      [](const FlightLogReader& log) { return strix::replayConfig(log).navigation; }, "log"_a,
       "The navigation's configuration that flew, to be changed and given to replay()");
   m.def("replay", &replay, "log"_a, "navigation"_a.none(), "states"_a, "gains"_a.none(), "out"_a,
         "compare"_a, "The logged inputs through the flight software");
