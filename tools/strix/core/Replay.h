@@ -82,12 +82,13 @@ class Cursor {
 /// @param gains  others than those that flew, or null
 [[nodiscard]] inline FlightSoftwareConfig replayConfig(const FlightLogReader& log,
                                                        const Gains* gains = nullptr) {
+  const Mission mission = loggedMission(log);
   const Airframe* airframe = findAirframe(log.info("vehicle"));
   if (airframe == nullptr) {
     log.refuse("a vehicle of include/vehicles", "'" + log.info("vehicle") + "'");
   }
-  return flightConfig(airframe->vehicle, gains == nullptr ? airframe->gains : *gains,
-                      loggedMission(log), loggedConfig(log).declination);
+  return flightConfig(airframe->vehicle, gains == nullptr ? airframe->gains : *gains, mission,
+                      loggedConfig(log).declination);
 }
 
 /// @tparam States  of the navigation filter
