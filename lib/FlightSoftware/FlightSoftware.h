@@ -32,7 +32,10 @@ class FlightSoftware {
         motors_(config.vehicle),
         logger_(board.card()),
         touchDown_(config.touchDown.duration),
-        hover_(config.hover.duration) {}
+        hover_(config.hover.duration),
+        wrongConfig_((sensors_.mountingValid() ? 0U : prearm::kMounting) |
+                     (isFlyable(config.mission, config.fence) ? 0U : prearm::kMission)),
+        cosArmTilt_(cosine(config.armTilt)) {}
 
   /// Starts the board and the log. Start-up calibration follows in the loop, in state BOOT.
   void setup() {
@@ -47,7 +50,11 @@ class FlightSoftware {
     hover_.reset(now);
     touchDown_.reset(now);
     entered_ = now;
-    for (PeriodicTask* task : {&stateLog_, &switchLog_, &stdLog_, &statusLog_}) task->start(now);
+    Micros phase = 0;  // each in a control tick of its own
+    for (PeriodicTask* task : {&stateLog_, &switchLog_, &stdLog_, &statusLog_}) {
+      phase += periodFromHz(Controller::kRateHz);
+      task->start(now + phase);
+    }
     logger_.begin(time,
                   {config_.vehicle.name, Board::kName, kVersion, kGitCommit, board_.bootId()});
     const Mission& mission = config_.mission;
@@ -203,7 +210,7 @@ class FlightSoftware {
   /// Everything that forbids arming now.
   [[nodiscard]] ConditionSet preArmFailures(Micros now, const PilotSwitches& pilot,
                                             const VehicleState& estimate) const {
-    ConditionSet set = 0;
+    ConditionSet set = wrongConfig_;
     const auto refuseIf = [&set](bool bad, ConditionSet bit) { set |= bad ? bit : 0U; };
     refuseIf(calibrating(), prearm::kNotCalibrated);
     refuseIf(!found_.imu || !sensors_.imuFresh(now), prearm::kImu);
@@ -212,13 +219,11 @@ class FlightSoftware {
     refuseIf(!sensors_.gpsFresh(now) || !sensors_.gpsUsable(sensors_.getGPSMeas()), prearm::kGps);
     refuseIf(origin_.count() < config_.originFixes, prearm::kOrigin);
     refuseIf((navigation_.health() & health::kNoArming) != 0, prearm::kEstimator);
-    refuseIf(!(cosTilt(estimate.attitude) > cosine(config_.armTilt)), prearm::kTilt);
+    refuseIf(!(cosTilt(estimate.attitude) > cosArmTilt_), prearm::kTilt);
     refuseIf(!navigation_.standsStill(), prearm::kMoving);
     refuseIf(pilot.kill, prearm::kKillSwitch);
     refuseIf(pilot.start, prearm::kStartSwitch);
     refuseIf(!found_.card || logger_.failed(), prearm::kLog);
-    refuseIf(!sensors_.mountingValid(), prearm::kMounting);
-    refuseIf(!isFlyable(config_.mission, config_.fence), prearm::kMission);
     refuseIf(!config_.fence.contains(estimate.positionNed), prearm::kFence);
     return set;
   }
@@ -265,14 +270,14 @@ class FlightSoftware {
     const VehicleState& s = estimator().state();
     hash.add(s.positionNed);
     hash.add(s.velocityNed);
-    for (const float element : toArray(s.attitude)) hash.add(element);
+    hash.add(toArray(s.attitude));
     hash.add(estimator().accelBias());
     hash.add(estimator().gyroBias());
     hash.add(estimator().magBias());
-    for (const float element : estimator().packedCovariance().elements()) hash.add(element);
+    hash.add(estimator().packedCovariance().elements());
     hash.add(controller_.error());
     hash.add(static_cast<std::uint32_t>(fsm_.state()));
-    for (const float command : motors_.commands()) hash.add(command);
+    hash.add(motors_.commands());
     return {time, hash.value(), elapsed(now, lastPass_), overruns()};
   }
 
@@ -322,6 +327,8 @@ class FlightSoftware {
   SensorSet found_;
   Persistence touchDown_;
   Persistence hover_;
+  const ConditionSet wrongConfig_;  ///< what no flight can mend
+  const float cosArmTilt_;
   PeriodicTask stateLog_{periodFromHz(10)};
   PeriodicTask switchLog_{periodFromHz(1)};
   PeriodicTask stdLog_{periodFromHz(50)};

@@ -43,12 +43,12 @@ class LogStream {
     }
     skip_ = KeepOneIn - 1;
     constexpr std::uint16_t kSize = kMessageSize - ulog::kMessageHeader;
-    typename decltype(ring)::Record record;
-    std::memcpy(&record[0], &kSize, sizeof kSize);
+    std::uint8_t* const record = ring.add();
+    if (record == nullptr) return;
+    std::memcpy(record, &kSize, sizeof kSize);
     record[2] = 'D';
-    std::memcpy(&record[3], &id, sizeof id);
-    std::memcpy(&record[ulog::kDataHeader], &topic, kPayloadSize<Topic>);
-    ring.push(record);
+    std::memcpy(record + 3, &id, sizeof id);
+    std::memcpy(record + ulog::kDataHeader, &topic, kPayloadSize<Topic>);
   }
 
   RingBuffer<kMessageSize, kRecords> ring;

@@ -251,27 +251,31 @@ void Logger<Card>::fillSector(LogTime now) {
   }
 }
 
-/// Takes from the ring that is nearest to overflowing. False: all are empty.
+/// Fills the sector from the rings, the one nearest to overflowing first. False: all are empty.
 template <class Card>
 bool Logger<Card>::takeFromRings(LogTime now) {
-  std::size_t fullest = kLogStreamCount;
-  std::size_t used = 0;
-  std::size_t capacity = 1;
+  constexpr std::size_t kFull = 1U << 20U;
+  std::size_t first = 0;
+  std::size_t most = 0;  // in parts of kFull
   std::size_t row = 0;
   forEachStream([&](auto& stream) {
-    constexpr std::size_t kCapacity = std::decay_t<decltype(stream)>::kRecords;
-    if (stream.ring.used() * capacity > used * kCapacity) {
-      fullest = row;
-      used = stream.ring.used();
-      capacity = kCapacity;
+    constexpr std::size_t kPart = kFull / std::decay_t<decltype(stream)>::kRecords;
+    const std::size_t used = stream.ring.used() * kPart;
+    if (used > most) {
+      first = row;
+      most = used;
     }
     ++row;
   });
-  row = 0;
-  forEachStream([&](auto& stream) {
-    if (row++ == fullest) take(stream.ring, now);
-  });
-  return used != 0;
+  if (most == 0) return false;
+  for (const bool before : {false, true}) {  // from the first on, then from the top to it
+    row = 0;
+    forEachStream([&](auto& stream) {
+      if ((row++ < first) != before) return;
+      while (!stream.ring.empty() && !stream_.sectorFull()) take(stream.ring, now);
+    });
+  }
+  return true;
 }
 
 /// Moves whole messages from the ring's oldest on, up to the one that fills the sector.

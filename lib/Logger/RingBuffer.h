@@ -33,15 +33,23 @@ class RingBuffer {
 
   /// False when the ring is full: the record is dropped and counted.
   bool push(const Record& record) {
+    std::uint8_t* const place = add();
+    if (place == nullptr) return false;
+    std::memcpy(place, record.data(), RecordSize);
+    return true;
+  }
+
+  /// Adds a record to be written in place: RecordSize bytes. Null when the ring is full: dropped
+  /// and counted.
+  [[nodiscard]] std::uint8_t* add() {
     if (used_ == Capacity) {
       ++dropped_;
-      return false;
+      return nullptr;
     }
     std::size_t head = tail_ + used_;
     if (head >= Capacity) head -= Capacity;
-    std::memcpy(&memory_[head * RecordSize], record.data(), RecordSize);
     ++used_;
-    return true;
+    return &memory_[head * RecordSize];
   }
 
   /// Bytes from the oldest record on that lie in one piece: whole records.

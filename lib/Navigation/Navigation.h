@@ -110,6 +110,7 @@ class Navigation {
   StandstillDetector standstill_;
   FieldTracker field_;
   Vibration vibration_;
+  PositiveDefiniteCheck<States> definite_;
   MotionHistory history_;
   VehicleState lastGood_;
   MotorState motors_ = MotorState::Stopped;
@@ -148,6 +149,7 @@ void Navigation<States>::initialize(const Alignment& alignment, float gravity, M
       magTaken_ = agreed_ = lastOutageAid_ = now;
   aid_.start(now);
   healthCheck_.start(now);
+  definite_ = {};
   health_ = health::kNone;
   started_ = true;
 }
@@ -264,7 +266,8 @@ void Navigation<States>::finishPass(Micros now) {
   }
   const bool finite = filter_.finite();
   filter_.injectError();
-  if (healthCheck_.run(now) || !finite) checkHealth(now, finite);
+  definite_.step();
+  if (healthCheck_.run(now) || !finite || !definite_.definite()) checkHealth(now, finite);
 }
 
 template <int States>
@@ -316,7 +319,8 @@ void Navigation<States>::checkHealth(Micros now, bool finite) {
   const auto setIf = [&found](bool bad, NavigationHealth bit) { found |= bad ? bit : 0U; };
   const bool sound = finite && filter_.healthy();
   setIf(!sound, health::kNotFinite);
-  setIf(sound && !isPositiveDefinite(filter_.packedCovariance()), health::kNotPositiveDefinite);
+  setIf(sound && !definite_.definite(), health::kNotPositiveDefinite);
+  if (definite_.done()) definite_.start(filter_.packedCovariance());
   setIf(elapsed(now, gpsTaken_) > config_.gpsTimeout, health::kNoGps);
   setIf(elapsed(now, altTaken_) > config_.altTimeout, health::kNoAltimeter);
   setIf(elapsed(now, magTaken_) > config_.magTimeout, health::kNoMagnetometer);
@@ -354,6 +358,7 @@ void Navigation<States>::restartFromFallback(Micros now) {
   history_.clear(now);  // what broke the filter may be in what it remembers
   standstill_ = StandstillDetector(config_.standstill);
   vibration_ = Vibration{};
+  definite_ = {};
   filter_.restart(complementary_.attitude(), lastGood_.positionNed, lastGood_.velocityNed);
   ++restarts_;
 }

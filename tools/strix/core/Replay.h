@@ -16,14 +16,15 @@ namespace strix {
 
 /// What a replay found.
 struct ReplayResult {
-  std::uint64_t begin = 0;     ///< us, log time
-  std::uint64_t end = 0;       ///< of the last pass
-  std::uint64_t logEnd = 0;    ///< of the log
-  std::uint32_t ticks = 0;     ///< control ticks compared
-  std::uint32_t digest = 0;    ///< of the replayed ticks' hashes: equal when two runs are
-  std::uint64_t firstBad = 0;  ///< time of the first tick that differs; 0: none
-  std::string field;           ///< in which it differs first
-  bool gap = false;            ///< ended where the log has lost inputs
+  std::uint64_t begin = 0;        ///< us, log time
+  std::uint64_t end = 0;          ///< of the last pass
+  std::uint64_t logEnd = 0;       ///< of the log
+  std::uint32_t ticks = 0;        ///< control ticks compared
+  std::uint32_t digest = 0;       ///< of the replayed ticks' hashes: equal when two runs are
+  std::uint32_t differences = 0;  ///< ticks that differ, as far as they were compared
+  std::uint64_t firstBad = 0;     ///< time of the first tick that differs; 0: none
+  std::string field;              ///< in which it differs first
+  bool gap = false;               ///< ended where the log has lost inputs
 };
 
 using FlightLogReader =
@@ -53,6 +54,35 @@ class Cursor {
   const std::deque<Topic>& records_;
   std::size_t next_ = 0;
 };
+
+// What the board had read when these were logged: toRecord of FlightLog.h backwards.
+
+[[nodiscard]] inline Vector3f toVector(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
+
+[[nodiscard]] inline ImuRaw asRead(const topic::SensorCombined& r) {
+  return {static_cast<Micros>(r.timestamp_sample), toVector(r.accelerometer_m_s2),
+          toVector(r.gyro_rad), r.temperature};
+}
+[[nodiscard]] inline MagRaw asRead(const topic::SensorMag& r) {
+  return {static_cast<Micros>(r.timestamp_sample), toVector(r.field_ut)};
+}
+[[nodiscard]] inline AltRaw asRead(const topic::SensorBaro& r) {
+  return {static_cast<Micros>(r.timestamp_sample), r.pressure, r.temperature};
+}
+[[nodiscard]] inline GpsRaw asRead(const topic::VehicleGpsPosition& r) {
+  return {static_cast<Micros>(r.timestamp_sample),
+          r.lat,
+          r.lon,
+          r.alt,
+          r.speed_knots,
+          r.course_deg,
+          r.hdop,
+          r.fix_type,
+          r.satellites_used};
+}
+[[nodiscard]] inline PilotSwitches asRead(const topic::ManualControlSwitches& r) {
+  return {r.arm_switch == 1, r.kill_switch == 1, r.start_switch == 1};
+}
 
 /// The configuration that flew, which a flight log begins with.
 [[nodiscard]] inline const topic::FlightConfig& loggedConfig(const FlightLogReader& log) {
@@ -143,7 +173,8 @@ class Replay {
       result.digest = digest.value();
       const bool same =
           logged != nullptr && ticked && logged->state_hash == software_.lastTick().state_hash;
-      if (same || result.firstBad != 0) continue;
+      if (same) continue;
+      if (++result.differences > 1) continue;
       result.firstBad = time;
       result.field = logged == nullptr ? "a control tick that the log has not"
                      : !ticked         ? "no control tick where the log has one"
@@ -187,28 +218,11 @@ class Replay {
   /// Sets the board to this time with what was read then.
   void give(std::uint64_t time) {
     board_.setTime(static_cast<Micros>(time));
-    if (const auto* r = imu_.take(time)) {
-      board_.put(ImuRaw{static_cast<Micros>(r->timestamp_sample), toVector(r->accelerometer_m_s2),
-                        toVector(r->gyro_rad), r->temperature});
-    }
-    if (const auto* r = mag_.take(time)) {
-      board_.put(MagRaw{static_cast<Micros>(r->timestamp_sample), toVector(r->field_ut)});
-    }
-    if (const auto* r = alt_.take(time)) {
-      board_.put(AltRaw{static_cast<Micros>(r->timestamp_sample), r->pressure, r->temperature});
-    }
-    if (const auto* r = gps_.take(time)) {
-      board_.put(GpsRaw{static_cast<Micros>(r->timestamp_sample), r->lat, r->lon, r->alt,
-                        r->speed_knots, r->course_deg, r->hdop, r->fix_type, r->satellites_used});
-    }
-    while (switches_.time() <= time) {
-      const auto* r = switches_.take(switches_.time());
-      board_.setPilot({r->arm_switch == 1, r->kill_switch == 1, r->start_switch == 1});
-    }
-  }
-
-  [[nodiscard]] static Vector3f toVector(const std::array<float, 3>& v) {
-    return {v[0], v[1], v[2]};
+    if (const auto* r = imu_.take(time)) board_.put(asRead(*r));
+    if (const auto* r = mag_.take(time)) board_.put(asRead(*r));
+    if (const auto* r = alt_.take(time)) board_.put(asRead(*r));
+    if (const auto* r = gps_.take(time)) board_.put(asRead(*r));
+    while (switches_.time() <= time) board_.setPilot(asRead(*switches_.take(switches_.time())));
   }
 
   /// The first logged field in which the tick at `time` differs.
