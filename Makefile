@@ -6,7 +6,7 @@ SETUP := @$(PYTHON) tools/setup/setup.py
 # The virtual environment without the compiled core, for what does not need it.
 ENVIRONMENT := $(SETUP) environment
 
-.PHONY: help setup fly test pio gains vectors bench consistency accuracy figures firmware format lint pins clean
+.PHONY: help setup fly test pio gains vectors bench footprint consistency accuracy figures firmware format lint pins clean
 
 help: ## List these verbs
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-11s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -34,8 +34,12 @@ vectors: ## Write sim_vectors/ anew with GNU Octave or MATLAB
 	@$(PYTHON) tools/setup/vectors.py
 
 bench: ## Count instructions per call on an emulated Cortex-M7, beside the budgets
-	$(ENVIRONMENT)
+	$(SETUP)
 	@$(VENV)/python tools/m7/bench.py
+
+footprint: ## Measure code, RAM and stack on a Cortex-M7, and what flight code calls
+	$(SETUP)
+	@$(VENV)/python tools/m7/footprint.py
 
 consistency: ## Check in many simulated flights that the filter is as sure of itself as it may be
 	$(SETUP)
@@ -55,13 +59,13 @@ firmware: ## Build the firmware for the Teensy 4.1 (needs PlatformIO's registry)
 
 format: ## Lay out C++ and Python as .clang-format and ruff say
 	$(ENVIRONMENT)
-	@git ls-files --cached --others --exclude-standard '*.h' '*.cpp' | xargs $(VENV)/clang-format -i
+	@git ls-files --cached --others --exclude-standard '*.h' '*.c' '*.cpp' | xargs $(VENV)/clang-format -i
 	@$(VENV)/ruff format tools
 	@$(VENV)/ruff check --fix tools
 
 lint: ## Check layout, Python types and, if clang-tidy is installed, the C++
 	$(SETUP)
-	@git ls-files --cached --others --exclude-standard '*.h' '*.cpp' | xargs $(VENV)/clang-format --dry-run -Werror
+	@git ls-files --cached --others --exclude-standard '*.h' '*.c' '*.cpp' | xargs $(VENV)/clang-format --dry-run -Werror
 	@$(VENV)/ruff format --check tools
 	@$(VENV)/ruff check tools
 	@cd tools && ../$(VENV)/mypy

@@ -7,54 +7,26 @@
 /// multiple of its sensor's period, so that ten times a second everything is due in one pass.
 #include <Replay.h>
 
-#include <algorithm>
-#include <array>
 #include <cstdio>
 #include <exception>
 #include <memory>
 #include <string>
-#include <vector>
 
-#include "InstructionCounter.h"
+#include "Counts.h"
 #include "NoCard.h"
 
 namespace {
 
+using m7::Counts;
 using strix::Micros;
-
-/// The counts of one kind of pass.
-class Passes {
- public:
-  explicit Passes(const char* name) : name_(name) {}
-
-  void add(std::uint32_t count) { counts_.push_back(count); }
-
-  /// @return false, and says so, when there was no such pass
-  [[nodiscard]] bool print(int states) { return print(states, name_); }
-  [[nodiscard]] bool print(int states, const char* name) {
-    if (counts_.empty()) {
-      std::printf("%s, %d states: no such pass\n", name, states);
-      return false;
-    }
-    std::sort(counts_.begin(), counts_.end());
-    std::uint64_t sum = 0;
-    for (const std::uint32_t count : counts_) sum += count;
-    std::printf("\"%s\",%d,0,%u,%lu,%lu,%lu,%lu\n", name, states, counts_.size(),
-                counts_[counts_.size() / 2], static_cast<unsigned long>(sum / counts_.size()),
-                counts_.front(), counts_.back());
-    return true;
-  }
-
- private:
-  const char* name_;
-  std::vector<std::uint32_t> counts_;
-};
 
 template <int States>
 class Flight {
  public:
-  Flight(const strix::FlightLogReader& log, const strix::FlightSoftwareConfig& config)
-      : log_(log), board_("", 1), software_(board_, config) {}
+  /// @param any  what all of its passes together are called
+  Flight(const strix::FlightLogReader& log, const strix::FlightSoftwareConfig& config,
+         const char* any)
+      : log_(log), board_("", 1), software_(board_, config), any_(any) {}
 
   void fly() {
     const Micros start = static_cast<Micros>(strix::loggedConfig(log_).timestamp);
@@ -72,12 +44,12 @@ class Flight {
 
   [[nodiscard]] bool printAll() {
     bool complete = true;
-    for (Passes* passes : {&imuOnly_, &imuAndLog_, &control_, &everything_, &any_}) {
+    for (Counts* passes : {&imuOnly_, &imuAndLog_, &control_, &everything_, &any_}) {
       complete = passes->print(States) && complete;
     }
     return complete;
   }
-  [[nodiscard]] bool printAny(const char* name) { return any_.print(States, name); }
+  [[nodiscard]] bool printAny() { return any_.print(States); }
 
  private:
   static constexpr Micros kMagPeriod = 10'000;  // us, DESIGN.md section 3
@@ -108,7 +80,7 @@ class Flight {
 
   void pass(Micros now, bool slow, bool all) {
     const std::uint32_t logged = software_.logger().status(0).bytes;
-    const std::uint32_t count = counter_.count([this] { software_.loop(); });
+    const m7::Counted count = m7::counter.count([this] { software_.loop(); });
     if (software_.stateMachine().state() == strix::FlightState::Boot) return;
     const bool log = software_.logger().status(0).bytes != logged;  // went to the card's sector
     const bool ticked = static_cast<Micros>(software_.lastTick().timestamp) == now;
@@ -126,12 +98,11 @@ class Flight {
   strix::Cursor<strix::topic::SensorBaro> alt_{log_};
   strix::Cursor<strix::topic::VehicleGpsPosition> gps_{log_};
   strix::Cursor<strix::topic::ManualControlSwitches> switches_{log_};
-  m7::InstructionCounter counter_;
-  Passes imuOnly_{"loop, IMU only"};
-  Passes imuAndLog_{"loop, IMU and log"};
-  Passes control_{"loop, IMU and control"};
-  Passes everything_{"loop, everything due"};
-  Passes any_{"loop, any"};
+  Counts imuOnly_{"loop, IMU only"};
+  Counts imuAndLog_{"loop, IMU and log"};
+  Counts control_{"loop, IMU and control"};
+  Counts everything_{"loop, everything due"};
+  Counts any_;
 };
 
 template <int States>
@@ -140,12 +111,12 @@ template <int States>
   strix::FlightSoftwareConfig heavy = asFlown;
   heavy.navigation.tiltFusion = strix::TiltFusion::Vibration;
   heavy.navigation.magFusion = strix::MagFusion::ThreeAxis;
-  const auto most = std::make_unique<Flight<States>>(log, heavy);
+  const auto most = std::make_unique<Flight<States>>(log, heavy, "loop, any");
   most->fly();
-  const auto usual = std::make_unique<Flight<States>>(log, asFlown);
+  const auto usual = std::make_unique<Flight<States>>(log, asFlown, "loop as flown, any");
   usual->fly();
   const bool complete = most->printAll();
-  return usual->printAny("loop as flown, any") && complete;
+  return usual->printAny() && complete;
 }
 
 }  // namespace
@@ -157,7 +128,7 @@ int main(int count, char** arguments) {
   }
   try {
     const strix::FlightLogReader log(arguments[1]);
-    std::printf("function,states,scalars,calls,median,mean,min,max\n");
+    Counts::printHead();
     const bool complete = bench<9>(log);
     return bench<18>(log) && complete ? 0 : 1;
   } catch (const std::exception& error) {

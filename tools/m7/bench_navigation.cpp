@@ -3,42 +3,24 @@
 /// Prints one CSV line per function; bench.py sets them beside the budgets. The filters fly: every
 /// call sees other numbers, P is full, and only calls whose scalars were all accepted are counted,
 /// because a rejected one does less.
-#include <algorithm>
-#include <array>
-#include <cstdint>
-#include <cstdio>
+#include <ESKF.h>
 
-#include "ESKF.h"
-#include "InstructionCounter.h"
+#include <cstdint>
+
+#include "Counts.h"
+#include "Noise.h"
 
 namespace {
 
+using m7::Counts;
 using strix::Micros;
 using strix::Vector3f;
 
-constexpr std::size_t kCalls = 64;       ///< counted calls per function
+constexpr std::uint32_t kPasses = 8400;  ///< of a flight: 64 counted calls per function
 constexpr std::uint32_t kWarmUp = 2000;  ///< passes before, ms: two seconds fill P and its biases
 constexpr std::uint32_t kCountEvery = 100;  ///< passes, the period of the slowest sensor
 constexpr Micros kPeriod = 1000;            ///< us, of the IMU
 constexpr float kDt = 1e-3F;                ///< s, the same
-
-/// Even noise in [-1, 1), the same in every run (constants: Numerical Recipes, "ranqd1").
-class Noise {
- public:
-  float operator()() {
-    seed_ = seed_ * 1664525U + 1013904223U;
-    return static_cast<float>(static_cast<std::int32_t>(seed_)) * 0x1p-31F;
-  }
-  Vector3f vector(float scale) {
-    const float x = (*this)();
-    const float y = (*this)();
-    const float z = (*this)();
-    return {scale * x, scale * y, scale * z};
-  }
-
- private:
-  std::uint32_t seed_ = 1;
-};
 
 /// An aircraft that turns about all axes while it moves gently, so that gravity is always usable.
 struct Truth {
@@ -62,37 +44,6 @@ struct Truth {
   }
 };
 
-/// The counts of one function.
-class Counts {
- public:
-  Counts(const char* name, int scalars) : name_(name), scalars_(scalars) {}
-
-  [[nodiscard]] bool full() const { return size_ == kCalls; }
-  void add(std::uint32_t count) {
-    if (!full()) counts_[size_++] = count;
-  }
-  [[nodiscard]] bool accepted(const strix::Innovation& innovation) const {
-    return innovation.rejected == 0 && innovation.count == scalars_;
-  }
-  /// @return false, and says so, when the function was not counted often enough
-  [[nodiscard]] bool print(int states) {
-    if (!full()) {
-      std::printf("%s, %d states: only %u calls could be counted\n", name_, states, size_);
-      return false;
-    }
-    std::sort(counts_.begin(), counts_.end());
-    std::printf("%s,%d,%d,%u,%lu,%lu,%lu\n", name_, states, scalars_, size_, counts_[size_ / 2],
-                counts_.front(), counts_.back());
-    return true;
-  }
-
- private:
-  const char* name_;
-  int scalars_;
-  std::size_t size_ = 0;
-  std::array<std::uint32_t, kCalls> counts_{};
-};
-
 /// One filter with the aircraft it follows.
 template <int States>
 class Flight {
@@ -101,7 +52,7 @@ class Flight {
       : truth_{motion, 0.0F, {}, Vector3f::Zero()},
         filter_(configWith(fusion)),
         mag_(fusion == strix::MagFusion::ThreeAxis ? Counts("updateMagMeas", 3)
-                                                   : Counts("updateMagMeas heading", 1)) {
+                                                   : Counts("updateMagMeas, heading only", 1)) {
     strix::Alignment alignment;
     alignment.attitude = truth_.state.attitude;
     alignment.magReference = kField;
@@ -137,9 +88,8 @@ class Flight {
     measure(inject_, nullptr, [&] { filter_.injectError(); });
   }
 
-  /// Long enough to count every function kCalls times even if half of the calls were rejected.
   void fly() {
-    while (passes_ < kWarmUp + 2 * kCalls * kCountEvery) pass();
+    while (passes_ < kPasses) pass();
   }
 
   [[nodiscard]] bool printFlying() {
@@ -159,8 +109,9 @@ class Flight {
   /// @param innovation  what the call leaves there says whether its scalars were accepted
   template <class Call>
   void measure(Counts& counts, const strix::Innovation* innovation, Call call) {
-    const std::uint32_t count = counter_.count(call);
-    const bool accepted = innovation == nullptr || counts.accepted(*innovation);
+    const m7::Counted count = m7::counter.count(call);
+    const bool accepted = innovation == nullptr ||
+                          (innovation->rejected == 0 && innovation->count == counts.scalars());
     if (accepted && passes_ > kWarmUp && passes_ % kCountEvery == 0) counts.add(count);
   }
 
@@ -172,19 +123,18 @@ class Flight {
 
   inline static const Vector3f kField{18.0F, 1.5F, 45.0F};  ///< uT, NED, central Europe
 
-  m7::InstructionCounter counter_;
-  Noise noise_;
+  m7::Noise noise_;
   Truth truth_;
   strix::ESKF<States> filter_;
   Micros now_ = 0;
   std::uint32_t passes_ = 0;
-  Counts predict_{"predict", 0};
+  Counts predict_{"predict"};
   Counts tilt_{"updateTiltMeas", 3};
   Counts mag_;
   Counts alt_{"updateAltMeas", 1};
   Counts gps_{"updateGPSMeas", 4};
   Counts standstill_{"updateStandstill", 3};
-  Counts inject_{"injectError", 0};
+  Counts inject_{"injectError"};
 };
 
 template <int States>
@@ -200,7 +150,7 @@ template <int States>
 }  // namespace
 
 int main() {
-  std::printf("function,states,scalars,calls,median,min,max\n");
+  Counts::printHead();
   const bool complete = bench<9>();
   return bench<18>() && complete ? 0 : 1;
 }

@@ -118,12 +118,6 @@ def object_of(source: Path, folder: Path) -> Path:
     return folder / f"{source.stem}.o"
 
 
-def calls_outside(object_file: Path) -> set[str]:
-    """The functions and variables that an object file takes from elsewhere."""
-    lines = must([NM, "--undefined-only", "--format=posix", str(object_file)]).splitlines()
-    return {line.split()[0] for line in lines}
-
-
 def run(elf: Path, arguments: Sequence[str] = (), timeout_s: float = 60.0) -> Run:
     """Run a program to its end, or to the timeout. No argument may have a space in it.
 

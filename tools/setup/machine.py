@@ -80,6 +80,7 @@ OPTIONAL_PACKAGES = {
         "libstdc++-arm-none-eabi-newlib",
     ],
     "qemu-system-arm": ["qemu-system-arm"],
+    "llvm-mca": ["llvm"],
 }
 
 

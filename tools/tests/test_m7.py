@@ -3,29 +3,13 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 sys.path.append(str(Path(__file__).parents[1] / "m7"))
 
-import bench
-from bench import Count, Limit, complaints, parse_counts, table
-
-from m7 import (
-    BuildError,
-    MissingToolError,
-    Run,
-    build,
-    calls_outside,
-    object_of,
-    require_tools,
-    run,
-)
-
-PREDICT = Count("predict", 18, 0, 64, 2000, 2000, 2000)
-HEIGHT = Count("updateAltMeas", 18, 1, 64, 900, 890, 910)
+from m7 import BuildError, MissingToolError, Run, build, require_tools, run
 
 
 def missing_tool() -> str:
@@ -104,66 +88,3 @@ def test_a_fault_ends_the_program_and_says_so(tmp_path: Path) -> None:
 def test_a_warning_in_a_program_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(BuildError, match="Werror=conversion"):
         run_program(tmp_path, "int main(int n, char**) { short s = n; return s; }\n")
-
-
-@needs_rig
-def test_heap_and_libm_are_found_in_measured_code(tmp_path: Path) -> None:
-    source = tmp_path / "program.cpp"
-    source.write_text(
-        "#include <cmath>\n#include <cstdlib>\n"
-        "volatile float x;\n"
-        "int main() { x = std::sin(x); return std::malloc(8) == nullptr ? 1 : 0; }\n"
-    )
-    build([source], tmp_path)
-    outside = calls_outside(object_of(source, tmp_path))
-    assert complaints([], {}, outside) == [
-        "the measured code calls malloc",
-        "the measured code calls sinf",
-    ]
-
-
-def test_a_missing_tool_is_named_with_its_package(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("PATH", "")
-    assert bench.main() == 2
-    said = capsys.readouterr().err
-    assert "qemu-system-arm" in said
-    assert "libnewlib-arm-none-eabi" in said
-
-
-def test_a_function_past_its_budget_fails_by_name() -> None:
-    # The worst call counts, 910, and 5 % are allowed: 910 / 1.05 = 866.7.
-    assert (
-        complaints(
-            [PREDICT, HEIGHT], {PREDICT.key: Limit(2000, 2000), HEIGHT.key: Limit(800, 867)}, []
-        )
-        == []
-    )
-    (said,) = complaints(
-        [PREDICT, HEIGHT], {PREDICT.key: Limit(2000, 2000), HEIGHT.key: Limit(800, 866)}, []
-    )
-    assert said.startswith("updateAltMeas, 18 states: 910 instructions, 5.1 % past")
-    assert bench.report([said]) == 1
-
-
-def test_a_budget_without_a_count_fails() -> None:
-    (said,) = complaints(
-        [PREDICT], {PREDICT.key: Limit(2200, 2200), ("predict", 9): Limit(560, 560)}, []
-    )
-    assert said == "predict, 9 states: has a budget but was not counted"
-
-
-def test_every_budget_line_can_be_read_and_is_printed_beside_its_count() -> None:
-    budget = bench.read_budget(bench.BUDGET)
-    assert budget["predict", 18] == Limit(2200, 2200)  # issue 3, item 6
-    assert budget["predict", 9].budget == 560 < budget["predict", 9].ceiling
-    assert budget["updateGPSMeas", 18].budget == 4 * budget["updateAltMeas", 18].budget
-    lines = table([replace(PREDICT, median=1100, min=1100, max=1100)], budget).splitlines()
-    assert lines[1].split() == ["predict", "18", "1100", "-", "2200", "50", "%", "yes"]
-
-
-def test_the_programs_lines_become_counts_and_a_varying_one_shows_its_range() -> None:
-    text = "function,states,scalars,calls,median,min,max\nupdateAltMeas,18,1,64,900,890,910\n"
-    assert parse_counts(text) == [HEIGHT]
-    assert table([HEIGHT], {}).splitlines()[1].endswith("no, 890 to 910")
