@@ -9,6 +9,10 @@
 #error "build with -DEIGEN_DONT_VECTORIZE (and -ffp-contract=off): see docs/determinism.md"
 #endif
 
+#ifdef __FAST_MATH__
+#error "build without -ffast-math: see docs/determinism.md"
+#endif
+
 // Arduino.h defines these as macros; Eigen has template parameters of these names.
 #ifdef B0
 #error "include Eigen before Arduino.h"
@@ -16,3 +20,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>  // cross products
+#include <cfloat>
+
+static_assert(FLT_EVAL_METHOD == 0, "a float must be computed as a float: no x87");
+static_assert(EIGEN_WORLD_VERSION == 3 && EIGEN_MAJOR_VERSION == 4 && EIGEN_MINOR_VERSION == 0,
+              "another release of Eigen may add in another order: run make determinism with it");

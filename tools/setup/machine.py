@@ -71,7 +71,8 @@ def require_build_tools() -> None:
         install(missing)
 
 
-# What some tests want and skip without: the independent reference, the emulated processor.
+# What some tests want and skip without: the independent reference, the emulated processor, a second
+# compiler.
 OPTIONAL_PACKAGES = {
     "octave-cli": ["octave", "octave-control"],
     "arm-none-eabi-g++": [
@@ -80,6 +81,7 @@ OPTIONAL_PACKAGES = {
         "libstdc++-arm-none-eabi-newlib",
     ],
     "qemu-system-arm": ["qemu-system-arm"],
+    "clang++": ["clang"],
     "llvm-mca": ["llvm"],
 }
 
