@@ -6,7 +6,7 @@ SETUP := @$(PYTHON) tools/setup/setup.py
 # The virtual environment without the compiled core, for what does not need it.
 ENVIRONMENT := $(SETUP) environment
 
-.PHONY: help setup fly test pio gains vectors bench footprint consistency accuracy figures firmware format lint pins clean
+.PHONY: help setup fly test pio gains vectors bench footprint determinism fuzz m7 consistency accuracy figures firmware format lint pins clean
 
 help: ## List these verbs
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-11s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -40,6 +40,26 @@ bench: ## Count instructions per call on an emulated Cortex-M7, beside the budge
 footprint: ## Measure code, RAM and stack on a Cortex-M7, and what flight code calls
 	$(SETUP)
 	@$(VENV)/python tools/m7/footprint.py
+
+determinism: ## Replay flights with every compiler here and on the emulated Cortex-M7, bit for bit
+	$(SETUP)
+	@$(VENV)/python tools/m7/determinism.py $(ARGS)
+
+fuzz: ## Fuzz the parser of GPS sentences for five minutes (needs clang)
+	$(ENVIRONMENT)
+	@mkdir -p build/fuzz/nmea
+	clang++ -std=gnu++17 -O1 -g -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
+	  -ffp-contract=off -DEIGEN_DONT_VECTORIZE -I test/fakes -I lib/Sensors -I lib/Math \
+	  -isystem $$($(VENV)/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/cmeel.prefix/include/eigen3 \
+	  test/fuzz/fuzz_nmea.cpp -o build/fuzz/fuzz_nmea
+	build/fuzz/fuzz_nmea -max_total_time=300 -max_len=1024 -dict=test/fuzz/nmea.dict \
+	  -artifact_prefix=build/fuzz/ build/fuzz/nmea test/fuzz/seeds
+
+m7: ## Build and run the Unity suites, whole flights and the benchmark on an emulated Cortex-M7
+	$(SETUP)
+	@$(VENV)/python tools/m7/suites.py
+	@$(VENV)/python tools/m7/determinism.py --builds m7-O2
+	@$(VENV)/python tools/m7/bench.py
 
 consistency: ## Check in many simulated flights that the filter is as sure of itself as it may be
 	$(SETUP)

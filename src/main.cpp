@@ -1,16 +1,25 @@
-/// The firmware: one board, and the flight software on it.
+/// The firmware: one board, and on it the flight software or, when a terminal asks, the checkout.
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
 #include <new>
 #include <string_view>
 
+#include "Checkout.h"
 #include "FlightConfig.h"
 #include "FlightSoftware.h"
+#include "PowerUpChoice.h"
 
 #include "board/TeensyBoard.h"
 
 // The board's ESCs are driven by pulse width; an airframe with other ESCs needs another EscPwm.
 static_assert(std::string_view(strix::kFlown.vehicle.commandUnit) == "us");
+
+// The flight software expects the sensors at the rates that the adapters set.
+static_assert(strix::kImuPeriod == strix::ImuIcm20649::kPeriod);
+static_assert(strix::SensorConfig::kMagPeriod == strix::MagLis2mdl::kPeriod);
+static_assert(strix::SensorConfig::kAltPeriod == strix::BaroBmp390::kPeriod);
+static_assert(strix::SensorConfig::kGpsPeriod == strix::GpsMtk3333::kPeriod);
 
 namespace {
 
@@ -25,11 +34,72 @@ alignas(Flight) DMAMEM std::byte memory[sizeof(Flight)];
 
 Flight& flight = *new (std::memset(memory, 0, sizeof memory)) Flight(board, strix::flightConfig());
 
+constexpr strix::CheckoutPins checkoutPins() {
+  namespace pins = strix::pins;
+  strix::CheckoutPins p{pins::kImuDataReady, pins::kImuBus.sda,  pins::kImuBus.scl,
+                        pins::kSlowBus.sda,  pins::kSlowBus.scl, pins::kGpsRx,
+                        pins::kGpsTx,        pins::kArmSwitch,   pins::kKillSwitch,
+                        pins::kStartSwitch};
+  if (strix::ImuIcm20649::kOnSpi) {
+    p.imuSda = 11;  // MOSI and clock: the Teensy's
+    p.imuScl = 13;
+    p.imuSelect = strix::SpiDevice::kChipSelect;
+    p.imuMiso = strix::SpiDevice::kMiso;
+  }
+  return p;
+}
+
+strix::Checkout<strix::TeensyBoard> checkout(board, strix::flightConfig(), checkoutPins());
+
+bool flying = true;
+
+/// Bound: 2 s without a terminal, 5 s more with one. No pulse goes to the ESCs meanwhile.
+bool terminalAsksForCheckout() {
+  strix::PowerUpChoice choice(::micros());
+  bool asked = false;
+  for (;;) {
+    const auto answer = choice.update(::micros(), static_cast<bool>(Serial), Serial.read());
+    if (choice.opened() && !asked) {
+      asked = true;
+      Serial.print(strix::PowerUpChoice::kQuestion);
+    }
+    if (answer != strix::PowerUpChoice::Answer::Open) {
+      return answer == strix::PowerUpChoice::Answer::Checkout;
+    }
+  }
+}
+
+/// Never more than there is room for: the core's write waits up to 120 ms for a full buffer.
+std::size_t toTerminal(const char* text, std::size_t count) {
+  const auto room = static_cast<std::size_t>(std::max(Serial.availableForWrite(), 0));
+  return room == 0 ? 0 : Serial.write(text, std::min(count, room));
+}
+
+[[noreturn]] void restart() {
+  SCB_AIRCR = 0x05FA0004;  // SYSRESETREQ, ARMv7-M Architecture Reference Manual B3.2.6
+  for (;;) {
+  }
+}
+
 }  // namespace
 
-void setup() { flight.setup(); }
+void setup() {
+  flying = !terminalAsksForCheckout();
+  if (flying) {
+    flight.setup();
+  } else {
+    checkout.begin();
+  }
+}
 
-void loop() { flight.loop(); }
+void loop() {
+  if (flying) {
+    flight.loop();
+    return;
+  }
+  checkout.step([] { return Serial.read(); }, toTerminal);
+  if (checkout.rebootAsked()) restart();
+}
 
 /// Called by the core after each pass and by libraries that wait: nothing of it is used here.
 void yield() {}

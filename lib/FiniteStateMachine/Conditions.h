@@ -61,9 +61,10 @@ constexpr ConditionSet kLog = 1U << 11U;
 constexpr ConditionSet kMounting = 1U << 12U;
 constexpr ConditionSet kMission = 1U << 13U;
 constexpr ConditionSet kFence = 1U << 14U;
+constexpr ConditionSet kGyroFilter = 1U << 15U;
 }  // namespace prearm
 
-constexpr std::array<PreArmCheck, 15> kPreArmChecks{{
+constexpr std::array<PreArmCheck, 16> kPreArmChecks{{
     {prearm::kImu, "IMU gives no data: check its wiring"},
     {prearm::kMag, "magnetometer gives no data: check its wiring"},
     {prearm::kAlt, "altimeter gives no data: check its wiring"},
@@ -80,6 +81,7 @@ constexpr std::array<PreArmCheck, 15> kPreArmChecks{{
     {prearm::kMounting, "a mounting matrix in FlightConfig.h is not a rotation"},
     {prearm::kMission, "the mission leaves the fence, or a height in it is not above the ground"},
     {prearm::kFence, "estimated position is outside the fence: restart where you want to fly"},
+    {prearm::kGyroFilter, "the gyro filter in FlightConfig.h is none: see docs/filtering.md"},
 }};
 
 /// The sentence of the first failing check; nullptr when none fails.

@@ -13,6 +13,8 @@
 ///   bool readMag(MagRaw&);              there. Never waits for one; how long each may take at
 ///   bool readAlt(AltRaw&);              worst is the board's stated bound.
 ///   bool readGps(GpsRaw&);
+///   void countFaults(SensorFaultCounts&);
+///                                       fills in the rows of its devices and buses
 ///   PilotSwitches readPilot();          the pilot's switches as they are now
 ///   void writeEsc(const EscCommands&);  M1..M4 in the vehicle's command unit; takes effect at the
 ///                                       next ESC frame
@@ -21,6 +23,7 @@
 #pragma once
 
 #include "RawSamples.h"
+#include "SensorFaults.h"
 #include "Vehicle.h"
 
 namespace strix {

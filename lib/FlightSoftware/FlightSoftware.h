@@ -30,10 +30,13 @@ class FlightSoftware {
         guidance_(config.mission, config.guidance),
         controller_(config.vehicle, config.gains, config.control),
         motors_(config.vehicle),
+        gyroFilter_(config.gyroFilter, 1e6F / static_cast<float>(config.sensors.imuPeriod),
+                    static_cast<float>(Controller::kRateHz), config.vehicle.motorTimeConstant),
         logger_(board.card()),
         touchDown_(config.touchDown.duration),
         hover_(config.hover.duration),
         wrongConfig_((sensors_.mountingValid() ? 0U : prearm::kMounting) |
+                     (gyroFilter_.valid() ? 0U : prearm::kGyroFilter) |
                      (isFlyable(config.mission, config.fence) ? 0U : prearm::kMission)),
         cosArmTilt_(cosine(config.armTilt)) {}
 
@@ -51,7 +54,8 @@ class FlightSoftware {
     touchDown_.reset(now);
     entered_ = now;
     Micros phase = 0;  // each in a control tick of its own
-    for (PeriodicTask* task : {&stateLog_, &switchLog_, &stdLog_, &statusLog_}) {
+    for (PeriodicTask* task :
+         {&stateLog_, &switchLog_, &stdLog_, &statusLog_, &faultLog_, &faultRecord_}) {
       phase += periodFromHz(Controller::kRateHz);
       task->start(now + phase);
     }
@@ -78,13 +82,14 @@ class FlightSoftware {
       startCalibration_.addImu(imu.sampled, imu.accel, imu.gyro);  // until it is done;
       navigation_.predict(imu.accel, imu.gyro, imu.sampled);       // from then on
       navigation_.updateTiltMeas(imu.accel);
+      controlRate_ = gyroFilter_.update(estimator().state().rateBody);
       logger_.logIMU(toRecord(time, clock_.at(raw.sampled), raw));
       logAid<AidSource::Tilt>(time, estimator().tiltInnovation());
     }
     if (sensors_.magUpdate(now)) {
       heard = true;
       const MagRaw& raw = sensors_.getMagMeas();
-      const Vector3f field = sensors_.processMagMeas(raw);
+      const Vector3f field = sensors_.processMagMeas(raw, motors_.throttle());
       startCalibration_.addMag(field);
       navigation_.updateMagMeas(field, now);
       logger_.logMag(toRecord(time, clock_.at(raw.sampled), raw));
@@ -133,13 +138,14 @@ class FlightSoftware {
 
   /// Periods of any task missed since the start.
   [[nodiscard]] std::uint32_t overruns() const {
-    return sensors_.overruns() + controller_.overruns();
+    return sensors_.missed() + controller_.overruns();
   }
 
  private:
   /// Every 2 ms: what the pilot wants, where to be, what it takes, and the motors.
   void controlTick(Micros now, LogTime time) {
-    const VehicleState estimate = navigation_.state();
+    VehicleState estimate = navigation_.state();
+    estimate.rateBody = controlRate_;
     updateStateMachine(now, time, estimate);
     const Reference& reference = guidance_.update(now);
     controller_.updateControl(now, reference, estimate);
@@ -147,9 +153,11 @@ class FlightSoftware {
     motors_.writeESC(board_);
     controller_.setAchieved(motors_.achieved());
     navigation_.setMotors(motorState(now));
+    gyroFilter_.setMotorSpeed(motors_.meanRevolutions());
     lastTick_ = tick(now, time);
     logger_.logGNC(toRecords(time, estimate, reference, controller_, motors_, lastTick_));
     logNavigation(now, time);
+    if (faultLog_.run(now)) logFaults(now, time);
   }
 
   [[nodiscard]] bool calibrating() const { return fsm_.state() == FlightState::Boot; }
@@ -303,6 +311,23 @@ class FlightSoftware {
                     "estimator: takes in again a sensor it had rejected for long");
   }
 
+  /// Nothing is decided by these counts: a reading that does not come is seen as that.
+  void logFaults(Micros now, LogTime time) {
+    SensorFaultCounts counts;
+    board_.countFaults(counts);
+    counts[SensorFault::ImuClipped] = sensors_.clipped();
+    counts[SensorFault::Invalid] = sensors_.invalid();
+    const std::uint32_t before = faults_.flags();
+    const std::uint32_t begun = faults_.update(now, counts);
+    for (std::size_t i = 0; i < kSensorFaultCount; ++i) {
+      if ((begun >> i & 1U) == 0) continue;
+      logger_.logText(ulog::LogLevel::Warning, time, kSensorFaultTexts[i]);
+    }
+    if (faults_.flags() == before && !faultRecord_.due(now)) return;
+    faultRecord_.postpone(now);
+    logger_.log(topic::SensorFaults{time, faults_.flags(), counts.all()});
+  }
+
   void logSwitches(Micros now, LogTime time, const PilotSwitches& pilot) {
     const bool changed = pilot.arm != loggedPilot_.arm || pilot.kill != loggedPilot_.kill ||
                          pilot.start != loggedPilot_.start;
@@ -322,6 +347,8 @@ class FlightSoftware {
   Guidance guidance_;
   Controller controller_;
   Motors motors_;
+  GyroFilter gyroFilter_;
+  Vector3f controlRate_ = Vector3f::Zero();  ///< rad/s, body, filtered for the controller
   Logger<typename Board::Card> logger_;
   LogClock clock_;
   SensorSet found_;
@@ -333,6 +360,9 @@ class FlightSoftware {
   PeriodicTask switchLog_{periodFromHz(1)};
   PeriodicTask stdLog_{periodFromHz(50)};
   PeriodicTask statusLog_{periodFromHz(10)};
+  PeriodicTask faultLog_{periodFromHz(10)};
+  PeriodicTask faultRecord_{periodFromHz(1)};
+  SensorFaultWatch faults_;
   NavigationHealth loggedHealth_ = health::kNone;
   std::uint32_t loggedReadmissions_ = 0;
   PilotSwitches loggedPilot_;

@@ -4,6 +4,7 @@
 #include "Controller.h"
 #include "Detectors.h"
 #include "Guidance.h"
+#include "GyroFilter.h"
 #include "NavigationConfig.h"
 #include "Sensors.h"
 #include "StartCalibration.h"
@@ -18,6 +19,7 @@ struct FlightSoftwareConfig {
   SensorConfig sensors{};
   StartCalibrationConfig startCalibration{};
   NavigationConfig navigation{};
+  GyroFilterConfig gyroFilter{};  ///< of the rates that the controller gets
   GuidanceConfig guidance{};
   ControlLimits control{};
   Fence fence{};

@@ -62,7 +62,7 @@ class LogStream {
 // clang-format off
 using LogStreams = std::tuple<
     //        topic                   instance  rate Hz  keep 1 in  buffer ms
-    LogStream<topic::SensorCombined,         0,    1000,         1,      2000>,
+    LogStream<topic::SensorCombined,         0,    1125,         1,      2000>,
     LogStream<topic::SensorMag,              0,     100,         1,      2000>,
     LogStream<topic::SensorBaro,             0,      50,         1,      2000>,
     LogStream<topic::VehicleGpsPosition,     0,      10,         1,      2000>,
@@ -75,7 +75,7 @@ using LogStreams = std::tuple<
     LogStream<topic::EstimatorStd,           0,      50,         1,      2000>,
     LogStream<topic::EstimatorSensorBias,    0,      10,         1,      2000>,
     LogStream<topic::EstimatorHealth,        0,      10,         1,      2000>,
-    LogStream<topic::EstimatorAidSource,     0,    1000,        10,      2000>,  // tilt
+    LogStream<topic::EstimatorAidSource,     0,    1125,        10,      2000>,  // tilt
     LogStream<topic::EstimatorAidSource,     1,     100,         1,      2000>,  // magnetometer
     LogStream<topic::EstimatorAidSource,     2,      50,         1,      2000>,  // altimeter
     LogStream<topic::EstimatorAidSource,     3,      10,         1,      2000>,  // GPS
@@ -87,6 +87,7 @@ using LogStreams = std::tuple<
     LogStream<topic::ActuatorOutputs,        0,     500,         1,      2000>,
     LogStream<topic::FlightState,            0,      10,         1,      4000>,  // and on change
     LogStream<topic::ControlTick,            0,     500,         1,      2000>,
+    LogStream<topic::SensorFaults,           0,       1,         1,      8000>,  // and on change
     LogStream<topic::LogStatus,              0,       2,         1,      4000>>;
 // clang-format on
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string_view>
 
 #include "Mathpk.h"
 #include "Vehicle.h"
@@ -17,7 +18,8 @@ class Motors {
   explicit Motors(const Vehicle& vehicle)
       : vehicle_(vehicle),
         squareMin_(vehicle.speedFlightMin * vehicle.speedFlightMin),
-        commandMin_(command(vehicle.speedFlightMin)) {
+        commandMin_(command(vehicle.speedFlightMin)),
+        revolution_(std::string_view(vehicle.speedUnit) == "rad/s" ? 0.5F / kPi : 1.0F) {
     const float top = speedOf(vehicle.commandFlightMax);
     squareMax_ = top * top;
     // Force on a rotor at (x, y) is -z, so its moment (r x F) is -y about x and +x about y; a rotor
@@ -51,6 +53,23 @@ class Motors {
   }
 
   [[nodiscard]] bool armed() const { return armed_; }
+
+  /// Mean speed that the ESCs are told, rev/s; 0 when off. The propellers shake at it.
+  [[nodiscard]] float meanRevolutions() const {
+    if (!armed_) return 0.0F;
+    float sum = 0.0F;
+    for (const float command : commands_) sum += speedOf(command);
+    return sum * (revolution_ / static_cast<float>(kMotorCount));
+  }
+
+  /// Mean command between off and the ESC's maximum, 0 to 1; 0 when off. What the motors' current
+  /// does to the magnetometer goes by it (MagCalibration::perThrottle).
+  [[nodiscard]] float throttle() const {
+    if (!armed_) return 0.0F;
+    float sum = 0.0F;
+    for (const float command : commands_) sum += command - vehicle_.commandOff;
+    return sum / (static_cast<float>(kMotorCount) * (vehicle_.commandMax - vehicle_.commandOff));
+  }
 
   /// Turns a wanted wrench into commands. A wrench with NaN, infinity or an absurd size counts as
   /// none.
@@ -205,6 +224,7 @@ class Motors {
   float squareMin_;
   float squareMax_ = 0.0F;
   float commandMin_;
+  float revolution_;  ///< of one unit of the vehicle's rotor speed, rev/s
   bool armed_ = false;
   EscCommands commands_{};
   Wrench achieved_;

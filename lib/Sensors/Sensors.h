@@ -4,23 +4,34 @@
 /// as it came, processXMeas() turns it into what the filter uses: body axes, SI, bias removed.
 #pragma once
 
-#include "Calibration.h"
 #include "Geodesy.h"
 #include "RawSamples.h"
+#include "SensorCalibration.h"
 
 namespace strix {
 
 struct SensorConfig {
+  // Of the devices. One that is slower, or faster by up to half, loses no reading by it.
+  static constexpr Micros kMagPeriod = periodFromHz(100);
+  static constexpr Micros kAltPeriod = periodFromHz(50);
+  static constexpr Micros kGpsPeriod = periodFromHz(10);
   Micros imuPeriod = periodFromHz(1000);
-  Micros magPeriod = periodFromHz(100);
-  Micros altPeriod = periodFromHz(50);
-  Micros gpsPeriod = periodFromHz(10);
+  Micros magPeriod = kMagPeriod;
+  Micros altPeriod = kAltPeriod;
+  Micros gpsPeriod = kGpsPeriod;
 
   // Longest silence before a sensor counts as lost.
   Micros imuTimeout = 20'000;
   Micros magTimeout = 500'000;
   Micros altTimeout = 500'000;
   Micros gpsTimeout = 1'000'000;
+
+  // Beyond what the sensor can measure a reading is none: it was garbled on its way.
+  float accelRange = 32.0F * kGravity;    ///< m/s^2: 32767 counts of an ICM20649 at +-30 g
+  float gyroRange = 2000.0F * kDegToRad;  ///< rad/s
+  float magRange = 5000.0F;               ///< uT: an LIS2MDL has +-4915
+  float lowestPressure = 30'000.0F;       ///< Pa: a BMP390 has 300 to 1250 hPa
+  float highestPressure = 125'000.0F;     ///< Pa
 
   ImuCalibration imu;
   MagCalibration mag;
@@ -41,36 +52,36 @@ struct GpsSample {
 
 constexpr float kKnot = 0.514444F;  ///< m/s
 
-/// When one sensor is due and when it was last heard.
+/// When one sensor is due and when it was last heard. A sensor has a clock of its own: it is asked
+/// from half a period after its last reading on, so that none waits for a task's
+/// phase.
 class SensorTiming {
  public:
-  SensorTiming(Micros period, Micros timeout) : task_(period), timeout_(timeout) {}
+  SensorTiming(Micros period, Micros timeout) : period_(period), timeout_(timeout) {}
 
-  void start(Micros now) {
-    task_.start(now);
+  void start(Micros now) { heard_ = now; }
+  [[nodiscard]] bool due(Micros now) const { return first_ || elapsed(now, heard_) >= period_ / 2; }
+  /// @param sampled  when the sensor measured it
+  void received(Micros now, Micros sampled) {
+    const Micros gap = elapsed(sampled, sampled_);
+    if (!first_ && gap > period_ + period_ / 2) missed_ += (gap + period_ / 2) / period_ - 1;
+    first_ = lost_ = false;
+    sampled_ = sampled;
     heard_ = now;
-  }
-  [[nodiscard]] bool due(Micros now) const { return task_.due(now); }
-  void received(Micros now) {
-    if (first_) {
-      task_.postpone(now);  // a device has its own phase: the wait for its first word is no overrun
-      first_ = false;
-    } else {
-      task_.done(now);
-    }
-    heard_ = now;
-    lost_ = false;
   }
   /// Due, but the device gave nothing. Remembers a loss, so that a device long dead does not look
   /// fresh when the clock shows the hour of its last reading again, 71.6 min later.
-  void missed(Micros now) { lost_ = lost_ || elapsed(now, heard_) > timeout_; }
+  void silent(Micros now) { lost_ = lost_ || elapsed(now, heard_) > timeout_; }
   [[nodiscard]] bool fresh(Micros now) const { return !lost_ && elapsed(now, heard_) <= timeout_; }
-  [[nodiscard]] std::uint32_t overruns() const { return task_.overruns(); }
+  /// Readings between two that were taken.
+  [[nodiscard]] std::uint32_t missed() const { return missed_; }
 
  private:
-  PeriodicTask task_;
+  Micros period_;
   Micros timeout_;
   Micros heard_ = 0;
+  Micros sampled_ = 0;
+  std::uint32_t missed_ = 0;
   bool first_ = true;
   bool lost_ = true;  ///< never heard, or silent for too long since
 };
@@ -101,22 +112,33 @@ class Sensors {
   }
 
   // Each is true when a new reading was taken. A late device is asked again every pass. A reading
-  // with NaN or infinity is none: it is counted, and a device that gives no other is lost in time.
+  // with NaN, infinity or more than the sensor's range is none: it is counted, and a device that
+  // gives no other is lost in time.
   [[nodiscard]] bool imuUpdate(Micros now) {
-    return update(imuTiming_, now, [this] {
-      return board_.readImu(imuRaw_) && sound(isFinite(imuRaw_.accel) && isFinite(imuRaw_.gyro));
+    const bool isNew = update(imuTiming_, imuRaw_, now, [this] {
+      return board_.readImu(imuRaw_) && sound(within(imuRaw_.accel, config_.accelRange) &&
+                                              within(imuRaw_.gyro, config_.gyroRange));
     });
+    constexpr float kEnd = 0.999F;
+    if (isNew && !(within(imuRaw_.accel, kEnd * config_.accelRange) &&
+                   within(imuRaw_.gyro, kEnd * config_.gyroRange))) {
+      ++clipped_;
+    }
+    return isNew;
   }
   [[nodiscard]] bool magUpdate(Micros now) {
-    return update(magTiming_, now,
-                  [this] { return board_.readMag(magRaw_) && sound(isFinite(magRaw_.field)); });
+    return update(magTiming_, magRaw_, now, [this] {
+      return board_.readMag(magRaw_) && sound(within(magRaw_.field, config_.magRange));
+    });
   }
   [[nodiscard]] bool altUpdate(Micros now) {
-    return update(altTiming_, now,
-                  [this] { return board_.readAlt(altRaw_) && sound(isFinite(altRaw_.pressure)); });
+    return update(altTiming_, altRaw_, now, [this] {
+      return board_.readAlt(altRaw_) && sound(altRaw_.pressure >= config_.lowestPressure &&
+                                              altRaw_.pressure <= config_.highestPressure);
+    });
   }
   [[nodiscard]] bool gpsUpdate(Micros now) {
-    return update(gpsTiming_, now, [this] {
+    return update(gpsTiming_, gpsRaw_, now, [this] {
       return board_.readGps(gpsRaw_) &&
              sound(isFinite(gpsRaw_.speedKnots) && isFinite(gpsRaw_.courseDeg));
     });
@@ -128,13 +150,17 @@ class Sensors {
   [[nodiscard]] const GpsRaw& getGPSMeas() const { return gpsRaw_; }
 
   [[nodiscard]] ImuSample processIMUMeas(const ImuRaw& raw) const {
-    return {raw.sampled, config_.imu.sensorToBody * (raw.accel - config_.imu.accelBias),
+    const Vector3f accel = config_.imu.accelScale * (raw.accel - config_.imu.accelBias);
+    return {raw.sampled, config_.imu.sensorToBody * accel,
             config_.imu.sensorToBody * raw.gyro - gyroBias_};
   }
 
+  /// @param throttle  mean of the motors' commands, 0 to 1 (Motors::throttle)
   /// @return field in body axes, uT
-  [[nodiscard]] Vector3f processMagMeas(const MagRaw& raw) const {
-    return config_.mag.sensorToBody * (config_.mag.softIron * (raw.field - config_.mag.hardIron));
+  [[nodiscard]] Vector3f processMagMeas(const MagRaw& raw, float throttle) const {
+    const MagCalibration& mag = config_.mag;
+    const Vector3f hardIron = mag.hardIron + throttle * mag.perThrottle;
+    return mag.sensorToBody * (mag.softIron * (raw.field - hardIron));
   }
 
   /// @return height above the ground of the start-up calibration, m
@@ -171,21 +197,29 @@ class Sensors {
   [[nodiscard]] bool magFresh(Micros now) const { return magTiming_.fresh(now); }
   [[nodiscard]] bool altFresh(Micros now) const { return altTiming_.fresh(now); }
   [[nodiscard]] bool gpsFresh(Micros now) const { return gpsTiming_.fresh(now); }
-  [[nodiscard]] std::uint32_t overruns() const {
-    return imuTiming_.overruns() + magTiming_.overruns() + altTiming_.overruns() +
-           gpsTiming_.overruns();
+  /// Readings of all sensors that were not taken.
+  [[nodiscard]] std::uint32_t missed() const {
+    return imuTiming_.missed() + magTiming_.missed() + altTiming_.missed() + gpsTiming_.missed();
   }
 
-  /// Readings with NaN or infinity since the start.
+  /// IMU samples at the end of the range since the start: the truth was beyond.
+  [[nodiscard]] std::uint32_t clipped() const { return clipped_; }
+  /// Readings with NaN, infinity or more than the sensor's range since the start.
   [[nodiscard]] std::uint32_t invalid() const { return invalid_; }
 
  private:
-  template <class Read>
-  [[nodiscard]] static bool update(SensorTiming& timing, Micros now, Read&& read) {
+  template <class Raw, class Read>
+  [[nodiscard]] static bool update(SensorTiming& timing, const Raw& raw, Micros now, Read&& read) {
     if (!timing.due(now)) return false;
     const bool isNew = read();
-    isNew ? timing.received(now) : timing.missed(now);
+    isNew ? timing.received(now, raw.sampled) : timing.silent(now);
     return isNew;
+  }
+
+  /// False also for NaN.
+  [[nodiscard]] static bool within(const Vector3f& v, float range) {
+    const auto inside = [range](float x) { return x >= -range && x <= range; };
+    return inside(v.x()) && inside(v.y()) && inside(v.z());
   }
 
   /// Counts a reading that is not.
@@ -208,6 +242,7 @@ class Sensors {
   float groundPressure_ = 101325.0F;
   LocalFrame frame_;
   std::uint32_t invalid_ = 0;
+  std::uint32_t clipped_ = 0;
 };
 
 }  // namespace strix

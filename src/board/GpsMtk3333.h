@@ -1,11 +1,16 @@
-/// The MTK3333 receiver: ten fixes a second over a serial port, parsed by Adafruit's library.
+/// The MTK3333 receiver: ten fixes a second over a serial port.
+///
+/// Adafruit's library talks to the module while it is set up. What the module says goes through
+/// lib/Sensors/Nmea.h instead of Adafruit_GPS::parse, which follows the next comma without asking
+/// whether there is one, so that a short sentence with the right checksum ends in a null pointer.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
-#include "RawSamples.h"
+#include "NmeaFixes.h"
 
 #include <Arduino.h>
 
@@ -15,44 +20,53 @@ namespace strix {
 
 class GpsMtk3333 {
  public:
-  explicit GpsMtk3333(HardwareSerialIMXRT& port) : port_(port), parser_(&port) {}
+  static constexpr Micros kPeriod = 100'000;  ///< from fix to fix, as begin() sets it
 
-  /// 57600 baud, GGA, GSA and RMC at 10 Hz, each command acknowledged by the receiver. False when
-  /// it does not answer; a receiver that talks later is read all the same. Bound: 0.45 s, 1.3 s
-  /// when every acknowledgement is missing but the first.
+  explicit GpsMtk3333(HardwareSerialIMXRT& port) : port_(port) {}
+
+  /// 57600 baud, GGA, GSA and RMC at 10 Hz: each command acknowledged by the receiver, then three
+  /// epochs seen that are 100 ms apart. False when any of that fails; a receiver that talks later
+  /// is read all the same. Bound: 1 s when it says nothing, 3.1 s when it fails at the last.
   [[nodiscard]] bool begin();
 
-  /// A whole epoch, once: published when its RMC sentence ends. Takes what the port has received,
-  /// at most kCharactersACall characters and one sentence. Bound: 0.1 ms.
+  /// A whole epoch, once. Takes what the port has received, at most kBytesACall. Bound: 0.1 ms.
   [[nodiscard]] bool read(GpsRaw& out);
 
-  /// Lines that are not a sound sentence of those three kinds.
-  [[nodiscard]] std::uint32_t rejected() const { return rejected_; }
+  /// Silent: `bytes` stands still. Noise or a wrong speed: `bytes` grows and `sound` does not.
+  [[nodiscard]] const NmeaLines::Counts& lines() const { return lines_.counts(); }
+  [[nodiscard]] const NmeaFixes::Counts& fixes() const { return fixes_.counts(); }
 
-  /// True for a line that Adafruit's parser can be trusted with: RMC, GGA or GSA with all its
-  /// fields and a two-digit checksum at the end. Adafruit_GPS::parse follows strchr(...) + 1
-  /// without asking whether there was a comma, and the checksum lets one damaged line in 256 pass.
-  [[nodiscard]] static bool isParseable(const char* line);
+  /// Lines that are no sound sentence.
+  [[nodiscard]] std::uint32_t rejected() const {
+    return lines().badChecksum + lines().broken + lines().overlong + fixes().malformed;
+  }
+
+  /// Times that the port's memory was found full, so that bytes were lost: nobody called read() for
+  /// 100 ms.
+  [[nodiscard]] std::uint32_t overflows() const { return overflows_; }
+
+  /// UTC from one epoch to the next, ms: 100 if the receiver still does as it was told.
+  [[nodiscard]] std::uint32_t interval() const { return fixes_.interval(); }
 
  private:
-  static constexpr int kCharactersACall = 96;  // 16 ms of the line at 57600 baud
+  static constexpr int kBytesACall = 96;  // 16 ms of the line
   static constexpr std::uint32_t kBaudAtPowerUp = 9600;
   static constexpr std::uint32_t kBaud = 57600;
-  static constexpr std::uint32_t kAckTimeout = 300;  // ms
+  static constexpr Micros kByte = 10'000'000 / kBaud;    // us: start, eight bits, stop
+  static constexpr std::uint32_t kAckTimeout = 300;      // ms: an epoch may be in front of it
+  static constexpr std::uint32_t kEpochsTimeout = 1500;  // ms: one more may come at the old rate
 
-  [[nodiscard]] bool command(const char* sentence, const char* acknowledgement);
-  [[nodiscard]] bool waitForLine(const char* wanted);
-  [[nodiscard]] bool take(const char* line, GpsRaw& out);
-  [[nodiscard]] std::uint32_t timeOfDay() const;
+  [[nodiscard]] bool command(Adafruit_GPS& module, const char* text, std::string_view answer);
+  [[nodiscard]] bool waitForAnswer(std::string_view wanted);
+  [[nodiscard]] bool waitForEpochs();
 
   HardwareSerialIMXRT& port_;
-  Adafruit_GPS parser_;
-  std::array<std::uint8_t, 512> received_{};  // the core's 64 bytes hold 11 ms of the line
-  Micros lineStart_ = 0;
-  Micros epochStart_ = 0;
-  std::uint32_t ggaTime_ = 0;  // ms of the day
-  bool ggaSeen_ = false;
-  std::uint32_t rejected_ = 0;
+  // Behind the core's own 64 bytes: together 100 ms of the line, two epochs.
+  std::array<std::uint8_t, 512> received_{};
+  static constexpr int kCoresBytes = 63;  // it keeps one free
+  NmeaLines lines_;
+  NmeaFixes fixes_;
+  std::uint32_t overflows_ = 0;
 };
 
 }  // namespace strix

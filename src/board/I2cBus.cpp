@@ -52,7 +52,7 @@ bool I2cBus::transfer(const std::uint32_t* commands, std::size_t commandCount, s
   const auto late = [start, limit] { return ARM_DWT_CYCCNT - start > limit; };
 
   while ((master.MSR & LPI2C_MSR_BBF) != 0) {  // 1 us after the last stop; for ever on a held bus
-    if (late()) return fail(faults_.late);
+    if (late()) return fail(faults_.held);
   }
   master.MSR = kAllFlags;  // written with ones to clear
   std::size_t sent = 0;
@@ -105,6 +105,7 @@ void I2cBus::freeLines() {
   }
   pullLow(pins_.sda);
   release(pins_.sda);
+  if (digitalRead(pins_.sda) != LOW && digitalRead(pins_.scl) != LOW) ++faults_.freed;
   begin();
 }
 

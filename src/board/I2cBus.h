@@ -24,11 +24,14 @@ class I2cBus {
  public:
   static constexpr std::size_t kMaxWrite = 12;  ///< bytes after the register's address
 
+  /// Counted since the start.
   struct Faults {
     std::uint32_t unacknowledged = 0;  ///< no device there, or it refused
-    std::uint32_t late = 0;            ///< deadline passed
+    std::uint32_t held = 0;            ///< a line was low before we began
+    std::uint32_t late = 0;            ///< deadline passed on the way: the clock was held
     std::uint32_t lost = 0;            ///< another drove the lines against us
-    std::uint32_t recoveries = 0;      ///< times the lines were clocked free
+    std::uint32_t recoveries = 0;      ///< times the lines were clocked
+    std::uint32_t freed = 0;           ///< of these: times both were high afterwards
   };
 
   /// @param port  address of the LPI2C registers that belong to `wire`

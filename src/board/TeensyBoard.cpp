@@ -22,6 +22,27 @@ SensorSet TeensyBoard::begin() {
   return found;
 }
 
+void TeensyBoard::countFaults(SensorFaultCounts& out) const {
+  const auto held = [](const I2cBus& bus) {
+    return bus.faults().held + bus.faults().late + bus.faults().lost;
+  };
+  out[SensorFault::ImuSilent] = imu_.faults().silent;
+  out[SensorFault::ImuLate] = imu_.polled();
+  out[SensorFault::ImuStuck] = imu_.faults().stuck;
+  out[SensorFault::MagSilent] = mag_.misses();
+  out[SensorFault::MagImplausible] = mag_.implausible();
+  out[SensorFault::MagStuck] = mag_.stuck();
+  out[SensorFault::AltSilent] = baro_.misses();
+  out[SensorFault::AltImplausible] = baro_.implausible();
+  out[SensorFault::AltStuck] = baro_.stuck();
+  out[SensorFault::GpsRejected] = gps_.rejected();
+  out[SensorFault::GpsLost] = gps_.overflows();
+  out[SensorFault::ImuBusHeld] = held(imuBus_);
+  out[SensorFault::ImuBusFreed] = imuBus_.faults().freed;
+  out[SensorFault::SlowBusHeld] = held(slowBus_);
+  out[SensorFault::SlowBusFreed] = slowBus_.faults().freed;
+}
+
 PilotSwitches TeensyBoard::readPilot() {
   const Micros now = ::micros();
   PilotSwitches switches;

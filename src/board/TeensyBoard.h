@@ -39,6 +39,8 @@ class TeensyBoard {
   [[nodiscard]] bool readAlt(AltRaw& out) { return baro_.read(out); }
   [[nodiscard]] bool readGps(GpsRaw& out) { return gps_.read(out); }
 
+  void countFaults(SensorFaultCounts& out) const;
+
   [[nodiscard]] PilotSwitches readPilot();
 
   void writeEsc(const EscCommands& commands) { esc_.write(commands); }

@@ -60,6 +60,7 @@ class BasicFakeBoard {
   FakeDevice<GpsRaw> gps{100'000};
   SensorSet found{true, true, true, true, true};  ///< what begin() reports
   PilotSwitches pilot;
+  SensorFaultCounts faults;  ///< of its devices
   Card sd;
   Vector3f gyroBias{0.01F, -0.02F, 0.015F};     ///< rad/s; used by hold()
   Vector3f fieldNed{15.6F, 1.1F, 48.0F};        ///< uT, southern Sweden; used by hold()
@@ -71,7 +72,7 @@ class BasicFakeBoard {
 
   /// @param start  what micros() returns first
   explicit BasicFakeBoard(Micros start = 0) : start_(start) {
-    escWrites.reserve(100'000);  // 200 s: no allocation while the flight code runs
+    escWrites.reserve(20'000);  // 40 s: no allocation while the flight code runs
     hold(Quaternion{});
     alt.reading.pressure = 100'800.0F;
     alt.reading.temperature = 25.0F;
@@ -113,6 +114,7 @@ class BasicFakeBoard {
   [[nodiscard]] bool readMag(MagRaw& out) { return mag.read(time_, start_, out); }
   [[nodiscard]] bool readAlt(AltRaw& out) { return alt.read(time_, start_, out); }
   [[nodiscard]] bool readGps(GpsRaw& out) { return gps.read(time_, start_, out); }
+  void countFaults(SensorFaultCounts& out) const { out = faults; }
   [[nodiscard]] PilotSwitches readPilot() const { return pilot; }
   void writeEsc(const EscCommands& commands) { escWrites.push_back({time_, commands}); }
   [[nodiscard]] Card& card() { return sd; }

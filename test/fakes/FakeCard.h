@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <deque>
 #include <functional>
 #include <map>
 #include <vector>
@@ -54,10 +55,10 @@ class FakeCard {
   bool writeSector(std::uint32_t index, Sector data) {
     timeTaken += writeTime;
     if (index >= diesAt) refuses = true;
-    const bool isNew = index >= bytes_.size() / kSectorSize;
+    const bool isNew = index >= sectors_.size();
     if (!access()) return told(false);
     isNew ? ++fullSectorWrites : ++rewrites;
-    if (isNew) bytes_.resize((index + std::size_t{1}) * kSectorSize, 0xEE);
+    while (index >= sectors_.size()) sectors_.emplace_back().fill(0xEE);
     pending_ = data;
     pendingIndex_ = index;
     const auto stall = stalls.find(index);
@@ -78,15 +79,16 @@ class FakeCard {
   /// The file as it was made durable last: what a power cut leaves of a card that keeps all since
   /// then in memory of its own.
   std::vector<std::uint8_t> durableFile() {
-    transfer();
-    return {bytes_.begin(), bytes_.begin() + syncedLength};
+    std::vector<std::uint8_t> file = sectors();
+    file.resize(syncedLength);
+    return file;
   }
 
   /// What a power cut leaves of a card that programs each sector at once: brings `bytes` up to date
-  /// from the sector at `from` on, for a test that cuts often.
+  /// from byte `from` on, where a sector begins, for a test that cuts often.
   void cutFile(Tear tear, std::vector<std::uint8_t>& bytes, std::size_t from = 0) const {
     bytes.resize(from);
-    bytes.insert(bytes.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(from), bytes_.end());
+    append(bytes, from / kSectorSize);
     if (pending_ == nullptr) return;
     std::uint8_t* sector = &bytes[pendingIndex_ * kSectorSize];
     if (now >= busyUntil_) {
@@ -101,9 +103,13 @@ class FakeCard {
   }
 
   /// Every sector handed over, with the zeros behind the last bytes.
-  const std::vector<std::uint8_t>& sectors() {
+  template <class Bytes = std::vector<std::uint8_t>>
+  Bytes sectors() {
     transfer();
-    return bytes_;
+    Bytes bytes;
+    bytes.reserve(sectors_.size() * kSectorSize);
+    append(bytes, 0);
+    return bytes;
   }
 
  private:
@@ -121,11 +127,18 @@ class FakeCard {
     return success;
   }
 
+  template <class Bytes>
+  void append(Bytes& bytes, std::size_t firstSector) const {
+    for (std::size_t i = firstSector; i < sectors_.size(); ++i) {
+      bytes.insert(bytes.end(), sectors_[i].begin(), sectors_[i].end());
+    }
+  }
+
   /// What the card does until it is ready again.
   void transfer() {
     if (now >= busyUntil_) syncedLength = syncingLength_;
     if (pending_ == nullptr) return;
-    std::memcpy(&bytes_[pendingIndex_ * kSectorSize], pending_, kSectorSize);
+    std::memcpy(sectors_[pendingIndex_].data(), pending_, kSectorSize);
     pending_ = nullptr;
   }
 
@@ -133,7 +146,8 @@ class FakeCard {
   std::uint32_t syncingLength_ = 0;
   const std::uint8_t* pending_ = nullptr;  // memory the card has yet to read
   std::size_t pendingIndex_ = 0;
-  std::vector<std::uint8_t> bytes_;
+  /// Grows without a copy: a flight's log is a third of the memory of the emulated Cortex-M7.
+  std::deque<std::array<std::uint8_t, kSectorSize>> sectors_;
 };
 
 }  // namespace strix

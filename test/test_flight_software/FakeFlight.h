@@ -19,6 +19,13 @@ constexpr Mission kLowMission{"low", 0.3F, 500'000, 1, {{{0.1F, -0.1F, 0.3F, 0.1
   return flightConfig(kQuad5in, kQuad5inGains, kLowMission, 0.07F);
 }
 
+/// Takes the sensors' ranges away, to see what the software behind them does with such readings.
+inline void believeAnything(FlightSoftwareConfig& config) {
+  SensorConfig& sensors = config.sensors;
+  sensors.accelRange = sensors.gyroRange = sensors.magRange = sensors.highestPressure = 3e38F;
+  sensors.lowestPressure = -3e38F;
+}
+
 template <class Board>
 class BasicFakeFlight {
  public:
@@ -89,8 +96,7 @@ class BasicFakeFlight {
           return board.now();
         },
         2'000'000);
-    const auto& bytes = board.sd.sectors();
-    return {bytes.begin(), bytes.end()};
+    return board.sd.template sectors<std::string>();
   }
 
   bool logSays(const char* text) { return log().find(text) != std::string::npos; }

@@ -110,7 +110,7 @@ const Refusal kRefusals[] = {
        f.run(0.2F);
      }},
     {prearm::kOrigin, [](FlightSoftwareConfig& c) { c.originFixes = 100; }, kAsUsual, kAsUsual},
-    {prearm::kEstimator, kAsUsual, kAsUsual,
+    {prearm::kEstimator, believeAnything, kAsUsual,
      [](FakeFlight& f) {
        f.board.imu.reading.gyro.x() = 1e30F;  // a finite one: NaN is no reading
        f.run(0.01F);
@@ -140,6 +140,8 @@ const Refusal kRefusals[] = {
      kAsUsual},
     {prearm::kMission, [](FlightSoftwareConfig& c) { c.mission.takeoffHeight = -1.0F; }, kAsUsual,
      kAsUsual},
+    {prearm::kGyroFilter, [](FlightSoftwareConfig& c) { c.gyroFilter.lowPass = 600.0F; }, kAsUsual,
+     kAsUsual},  // beyond Nyquist
     // The estimate left a fence of 3 cm, on the ground, with the GPS.
     {prearm::kFence,
      [](FlightSoftwareConfig& c) {

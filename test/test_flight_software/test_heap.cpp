@@ -4,14 +4,11 @@
 #include "FakeFlight.h"
 #include "suites.h"
 
-// glibc lets a program put its own malloc in front; C++'s operator new and Eigen both come through
-// it. With another C library, or under a sanitizer that does the same, this suite is ignored.
+// A program may put its own malloc in front of the C library's; C++'s operator new and Eigen both
+// come through it. With another library than these two, or under a sanitizer that does the same,
+// this suite is left out.
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
 #define STRIX_COUNTS_ALLOCATIONS 1
-
-namespace {
-unsigned allocations = 0;
-}
 
 // NOLINTBEGIN(bugprone-reserved-identifier,readability-*): the names are glibc's
 extern "C" {
@@ -19,25 +16,56 @@ void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);
 void* __libc_realloc(void* memory, std::size_t size);
 void* __libc_memalign(std::size_t alignment, std::size_t size);
+}
+// NOLINTEND(bugprone-reserved-identifier,readability-*)
 
+namespace libc {
+constexpr auto malloc = __libc_malloc;
+constexpr auto calloc = __libc_calloc;
+constexpr auto realloc = __libc_realloc;
+constexpr auto memalign = __libc_memalign;
+}  // namespace libc
+
+#elif defined(_NEWLIB_VERSION)  // the emulated Cortex-M7
+#define STRIX_COUNTS_ALLOCATIONS 1
+#include <malloc.h>
+#include <reent.h>
+
+namespace libc {
+void* malloc(std::size_t size) { return _malloc_r(_REENT, size); }
+void* calloc(std::size_t count, std::size_t size) { return _calloc_r(_REENT, count, size); }
+void* realloc(void* memory, std::size_t size) { return _realloc_r(_REENT, memory, size); }
+void* memalign(std::size_t alignment, std::size_t size) {
+  return _memalign_r(_REENT, alignment, size);
+}
+}  // namespace libc
+
+extern "C" void free(void* memory) { _free_r(_REENT, memory); }  // comes with malloc or not at all
+#endif
+
+#ifdef STRIX_COUNTS_ALLOCATIONS
+namespace {
+unsigned allocations = 0;
+}
+
+extern "C" {
 void* malloc(std::size_t size) {
   ++allocations;
-  return __libc_malloc(size);
+  return libc::malloc(size);
 }
 void* calloc(std::size_t count, std::size_t size) {
   ++allocations;
-  return __libc_calloc(count, size);
+  return libc::calloc(count, size);
 }
 void* realloc(void* memory, std::size_t size) {
   ++allocations;
-  return __libc_realloc(memory, size);
+  return libc::realloc(memory, size);
 }
 void* aligned_alloc(std::size_t alignment, std::size_t size) {
   ++allocations;
-  return __libc_memalign(alignment, size);
+  return libc::memalign(alignment, size);
 }
 }
-// NOLINTEND(bugprone-reserved-identifier,readability-*)
 #endif
 
 using namespace strix;

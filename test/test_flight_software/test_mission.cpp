@@ -51,7 +51,8 @@ void test_a_mission_that_leaves_the_air_or_the_fence_is_not_flyable() {
 }
 
 void test_a_sign_is_believed_once_it_has_lasted() {
-  for (const Micros start : {Micros{0}, Micros{5'000'000}, 0U - 200'000U, 0U - 1U}) {
+  constexpr Micros kStarts[] = {0, 5'000'000, 0U - 200'000U, 0U - 1U};
+  for (const Micros start : kStarts) {
     Persistence sign(400'000);
     sign.reset(start);
     for (Micros t = 0; t < 400'000; t += 2000) TEST_ASSERT_FALSE(sign.update(start + t, true));

@@ -185,14 +185,61 @@ void test_leaving_the_fence_stops_the_motors() {
 }
 
 void test_a_sick_estimator_stops_the_motors() {
+  FlightSoftwareConfig config = lowFlight();
+  believeAnything(config);
   for (const FlightState state : kMotorStates) {
-    FakeFlight flight;
+    FakeFlight flight(0, config);
     flight.getReady();
     flight.reach(state);
     flight.board.imu.reading.gyro.y() = 1e30F;
     flight.run(0.006F);
     TEST_ASSERT_TRUE(flight.state() == FlightState::Safe);
     TEST_ASSERT_TRUE(areOff(flight.board.esc()));
+  }
+}
+
+void test_one_garbled_reading_is_left_out_and_an_imu_that_gives_no_other_is_lost() {
+  for (const float garbage : {1e30F, -40.0F}) {  // rad/s; the range is 34.9
+    FakeFlight flight;
+    flight.getReady();
+    flight.reach(FlightState::Hold);
+    flight.board.imu.reading.gyro.y() = garbage;
+    flight.run(0.001F);
+    flight.board.hold(Quaternion{});
+    flight.run(0.1F);
+    TEST_ASSERT_TRUE(flight.state() == FlightState::Hold);
+    TEST_ASSERT_TRUE(flight.software.sensors().invalid() > 0);
+
+    flight.board.imu.reading.gyro.y() = garbage;
+    flight.run(0.026F);  // 20 ms of silence, a sample before it, a tick and a pass
+    TEST_ASSERT_TRUE(flight.state() == FlightState::Safe);
+    TEST_ASSERT_TRUE(areOff(flight.board.esc()));
+    TEST_ASSERT_TRUE(
+        flight.logSays(kSensorFaultTexts[static_cast<std::size_t>(SensorFault::Invalid)]));
+  }
+}
+
+void test_a_fault_on_the_way_to_a_sensor_is_named_once_and_again_when_it_comes_back() {
+  for (std::size_t i = 0; i < kSensorFaultCount; ++i) {
+    const auto fault = static_cast<SensorFault>(i);
+    const bool ofTheBoard = fault != SensorFault::ImuClipped && fault != SensorFault::Invalid;
+    if (!ofTheBoard) continue;
+    const std::string text = kSensorFaultTexts[i];
+    FakeFlight flight;
+    flight.getReady();
+    for (int i = 0; i < 20; ++i) {
+      ++flight.board.faults[fault];
+      flight.run(0.1F);
+    }
+    flight.run(2.0F);
+    ++flight.board.faults[fault];
+    flight.run(0.2F);
+    std::size_t said = 0;
+    const std::string log = flight.log();
+    for (std::size_t at = log.find(text); at != std::string::npos; at = log.find(text, at + 1)) {
+      ++said;
+    }
+    TEST_ASSERT_EQUAL_MESSAGE(2, said, text.c_str());
   }
 }
 
@@ -246,6 +293,8 @@ void runMotorsOffTests() {
   RUN_TEST(test_a_tilt_past_90_deg_stops_the_motors_whichever_way_it_goes);
   RUN_TEST(test_leaving_the_fence_stops_the_motors);
   RUN_TEST(test_a_sick_estimator_stops_the_motors);
+  RUN_TEST(test_one_garbled_reading_is_left_out_and_an_imu_that_gives_no_other_is_lost);
+  RUN_TEST(test_a_fault_on_the_way_to_a_sensor_is_named_once_and_again_when_it_comes_back);
   RUN_TEST(test_safe_is_left_only_by_arming_anew_on_the_ground);
   RUN_TEST(test_the_log_tells_why_the_motors_stopped);
 }

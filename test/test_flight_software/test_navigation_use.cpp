@@ -1,4 +1,6 @@
 // What the flight software tells the navigation, and what it makes of what it hears from it.
+#include <cmath>
+
 #include "FakeFlight.h"
 #include "suites.h"
 
@@ -134,14 +136,14 @@ struct Sickness {
 constexpr auto kAsUsual = [](auto&) {};
 
 const Sickness kSicknesses[] = {
-    {health::kNotFinite, kAsUsual,
+    {health::kNotFinite, believeAnything,
      [](FakeFlight& f) {
        f.board.imu.reading.gyro.x() = 1e30F;  // a finite one: NaN is no reading
        f.run(0.01F);
        f.board.hold(kNorthEast);
      }},
     // Once is a new start; the second time within 10 s it stays so.
-    {health::kNotPositiveDefinite, kAsUsual,
+    {health::kNotPositiveDefinite, believeAnything,
      [](FakeFlight& f) {
        strike(f, kOverflow);
        f.run(0.2F);
@@ -149,7 +151,7 @@ const Sickness kSicknesses[] = {
          strike(f, {1e8F, -2e7F, 3e7F});
        }
      }},
-    {health::kRestarted, kAsUsual, [](FakeFlight& f) { strike(f, kOverflow); }},
+    {health::kRestarted, believeAnything, [](FakeFlight& f) { strike(f, kOverflow); }},
     // Gravity from elsewhere, and a filter that believes its gyro alone.
     {health::kAttitudesDisagree,
      [](FlightSoftwareConfig& c) {
@@ -224,6 +226,7 @@ void test_what_comes_back_is_said_again() {
 void test_a_flight_whose_filter_begins_anew_goes_on() {
   FlightSoftwareConfig config = lowFlight();
   config.mission.takeoffHoldTime = 20'000'000;
+  believeAnything(config);
   FakeFlight flight(0, config);
   flight.board.hold(kNorthEast);
   flight.getReady();
@@ -239,10 +242,37 @@ void test_a_flight_whose_filter_begins_anew_goes_on() {
   TEST_ASSERT_TRUE(areOff(flight.board.esc()));
 }
 
+// ---- what the controller gets ----
+
+void test_the_controllers_rates_are_filtered_and_the_estimators_are_not() {
+  for (const float lowPass : {0.0F, 40.0F}) {
+    FlightSoftwareConfig config = lowFlight();
+    config.gyroFilter.lowPass = lowPass;
+    FakeFlight flight(0, config);
+    flight.passTime = 1000;
+    flight.getReady();
+    float control = 0.0F;
+    float estimate = 0.0F;
+    for (int i = 0; i < 600; ++i) {  // a shake of 250 Hz
+      flight.board.hold(Quaternion{}, {i / 2 % 2 == 0 ? 0.5F : -0.5F, 0.0F, 0.0F});
+      flight.pass();
+      if (i < 300) continue;  // what the filter was before
+      control = std::fmax(control, std::fabs(flight.software.controller().error()(9)));
+      estimate = std::fmax(estimate, std::fabs(flight.software.estimator().state().rateBody.x()));
+    }
+    TEST_ASSERT_FLOAT_WITHIN(0.05F, 0.5F, estimate);
+    // Second order: (40/250)^2 = 0.026 of it, less near Nyquist.
+    lowPass == 0.0F ? TEST_ASSERT_FLOAT_WITHIN(0.05F, 0.5F, control)
+                    : TEST_ASSERT_FLOAT_WITHIN(0.02F, 0.0F, control);
+  }
+}
+
 // ---- what is recorded ----
 
 void test_status_and_biases_of_the_filter_are_in_the_log_ten_times_a_second() {
-  FakeFlight flight;
+  FlightSoftwareConfig config = lowFlight();
+  believeAnything(config);
+  FakeFlight flight(0, config);
   flight.board.hold(kNorthEast);
   flight.getReady();
   flight.board.gyroBias += Vector3f(0.002F, -0.001F, 0.0015F);  // what the calibration missed
@@ -301,5 +331,6 @@ void runNavigationUseTests() {
   RUN_TEST(test_what_comes_back_is_said_again);
   RUN_TEST(test_a_flight_whose_filter_begins_anew_goes_on);
   RUN_TEST(test_status_and_biases_of_the_filter_are_in_the_log_ten_times_a_second);
+  RUN_TEST(test_the_controllers_rates_are_filtered_and_the_estimators_are_not);
   RUN_TEST(test_vibration_is_in_the_log);
 }

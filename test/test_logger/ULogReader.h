@@ -8,6 +8,7 @@
 #include <cstring>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 struct ULogFile {
@@ -27,7 +28,7 @@ struct ULogFile {
   struct Record {
     std::uint16_t id;
     std::size_t messageStart;  // in the file
-    std::vector<std::uint8_t> data;
+    std::size_t size;          // bytes of its data
   };
   struct Text {
     char level;
@@ -43,7 +44,11 @@ struct ULogFile {
   std::vector<Record> records;
   std::vector<Text> texts;
 
-  explicit ULogFile(const std::vector<std::uint8_t>& bytes) { read(bytes); }
+  explicit ULogFile(std::vector<std::uint8_t> bytes) : bytes_(std::move(bytes)) { read(bytes_); }
+
+  [[nodiscard]] const std::uint8_t* data(const Record& record) const {
+    return &bytes_[record.messageStart + kDataHead];
+  }
 
   /// All records of one instance of a topic, in the file's order.
   std::vector<Record> of(const std::string& topic, int instance = 0) const {
@@ -61,11 +66,13 @@ struct ULogFile {
     const Field& f = formats.at(subscriptions.at(record.id).topic).fields.at(field);
     TEST_ASSERT_EQUAL_STRING_MESSAGE(typeOf(T{}), f.type.c_str(), field.c_str());
     TEST_ASSERT_TRUE_MESSAGE(index < f.count, field.c_str());
-    std::memcpy(&out, &record.data.at(f.offset + index * sizeof(T)), sizeof(T));
+    std::memcpy(&out, data(record) + f.offset + index * sizeof(T), sizeof(T));
     return out;
   }
 
  private:
+  static constexpr std::size_t kDataHead = 5;  // size, type and id before a record's data
+
   static const char* typeOf(std::uint64_t) { return "uint64_t"; }
   static const char* typeOf(std::uint32_t) { return "uint32_t"; }
   static const char* typeOf(std::int32_t) { return "int32_t"; }
@@ -110,7 +117,7 @@ struct ULogFile {
           subscription(at, body);
           break;
         case 'D':
-          data(at, body);
+          record(at, body);
           break;
         case 'L':
           text(at, body);
@@ -167,12 +174,12 @@ struct ULogFile {
     subscriptions[id] = {topic, body[0]};
   }
 
-  void data(std::size_t at, const std::vector<std::uint8_t>& body) {
+  void record(std::size_t at, const std::vector<std::uint8_t>& body) {
     const auto id = static_cast<std::uint16_t>(body[0] + 256U * body[1]);
     if (subscriptions.count(id) == 0) return fail(at, "data of an unknown id");
     const std::string& topic = subscriptions[id].topic;
     if (body.size() - 2 != formats[topic].size) return fail(at, "size of " + topic);
-    records.push_back({id, at, {body.begin() + 2, body.end()}});
+    records.push_back({id, at, body.size() - 2});
   }
 
   void text(std::size_t at, const std::vector<std::uint8_t>& body) {
@@ -181,4 +188,6 @@ struct ULogFile {
     std::memcpy(&t.time, &body[1], sizeof t.time);
     texts.push_back(t);
   }
+
+  std::vector<std::uint8_t> bytes_;
 };

@@ -10,6 +10,8 @@ using namespace strix;
 
 namespace {
 
+constexpr std::size_t kImuRing = std::tuple_element_t<0, LogStreams>::kRecords;
+
 LogFlight flight;
 
 void test_a_busy_card_is_left_alone_and_a_pass_costs_at_most_one_access() {
@@ -65,8 +67,8 @@ void test_a_stall_of_four_seconds_drops_what_does_not_fit_and_says_how_much() {
   TEST_ASSERT_TRUE(flight.finish(2'000'000));
   const ULogFile file = flight.readDurable();
   flight.assertNothingIsMissing(file);
-  // 4 s at 1000 Hz into a ring of 2000; what came in while the others were written adds nothing.
-  TEST_ASSERT_UINT32_WITHIN(60, 2000, flight.logger.status(0).dropped_by_id[0]);
+  // 4 s at 1000 Hz into a ring of 2250; what came in while the others were written adds nothing.
+  TEST_ASSERT_UINT32_WITHIN(60, 4000 - kImuRing, flight.logger.status(0).dropped_by_id[0]);
   const auto statuses = file.of("log_status");
   TEST_ASSERT_EQUAL_UINT32(flight.logger.dropped(),
                            file.value<std::uint32_t>(statuses.back(), "dropped"));
@@ -193,7 +195,7 @@ void test_the_longest_stall_is_told_not_the_last() {
 void test_saving_ends_with_the_final_count_of_drops() {
   flight.begin(0);
   TEST_ASSERT_TRUE(flight.finish(1'000'000));
-  for (int i = 0; i < 2500; ++i) flight.logger.logIMU({});
+  for (std::size_t i = 0; i < kImuRing + 500; ++i) flight.logger.logIMU({});
   TEST_ASSERT_TRUE(flight.finish(400'000));
   const ULogFile file = flight.readDurable();
   TEST_ASSERT_EQUAL_UINT32(500, file.value<std::uint32_t>(file.of("log_status").back(), "dropped"));

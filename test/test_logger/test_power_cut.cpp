@@ -26,15 +26,10 @@ struct Cut {
 
 /// What a card has left, followed from cut to cut.
 struct Survivor {
-  std::vector<std::uint8_t> bytes;
   LogBlocks blocks;
   std::vector<Cut> cuts;
 
-  /// @param unchanged  bytes that are as they were at the last cut
-  void note(std::size_t unchanged) {
-    blocks.update(bytes, unchanged);
-    cuts.push_back({flight.now, blocks.intact()});
-  }
+  void note() { cuts.push_back({flight.now, blocks.intact()}); }
 };
 
 /// Flies and cuts the power before and after every access: on a card that has in memory of its own
@@ -48,7 +43,8 @@ struct CutFlight {
     std::mt19937 random(11);
     flight.begin(1000);
     flight.card.busyTime = [&random] { return 300 + random() % 1200; };
-    flight.card.onAccess = [this] { cut(); };
+    std::vector<std::uint8_t> bytes;
+    flight.card.onAccess = [this, &bytes] { cut(bytes); };
     for (int i = 0; i < seconds * 1000; ++i) flight.pass();
     flight.card.onAccess = nullptr;
     TEST_ASSERT_TRUE(flight.finish(2'000'000));
@@ -57,20 +53,26 @@ struct CutFlight {
   }
 
  private:
-  void cut() {
+  /// @param bytes  what a card had left at the last cut
+  void cut(std::vector<std::uint8_t>& bytes) {
     constexpr FakeCard::Tear kTears[] = {FakeCard::Tear::Old, FakeCard::Tear::HalfNew,
                                          FakeCard::Tear::Noise};
+    // A sector is written again only while it is the last: before it, all cards have the same.
+    const std::size_t unchanged = bytes.empty() ? 0 : bytes.size() - kSectorSize;
     for (std::size_t i = 0; i < 3; ++i) {
-      Survivor& card = programmed[i];
-      // A sector is written again only while it is the last.
-      const std::size_t unchanged = card.bytes.empty() ? 0 : card.bytes.size() - kSectorSize;
-      flight.card.cutFile(kTears[i], card.bytes, unchanged);
-      card.note(unchanged);
+      flight.card.cutFile(kTears[i], bytes, unchanged);
+      programmed[i].blocks.update(bytes, unchanged);
+      programmed[i].note();
     }
-    const std::size_t unchanged = synced.bytes.size();
-    if (flight.card.syncedLength != unchanged) synced.bytes = flight.card.durableFile();
-    synced.note(unchanged);
+    if (flight.card.syncedLength != syncedLength_) {
+      const std::vector<std::uint8_t> file = flight.card.durableFile();
+      synced.blocks.update(file, syncedLength_);
+      syncedLength_ = file.size();
+    }
+    synced.note();
   }
+
+  std::size_t syncedLength_ = 0;
 };
 
 /// Time of the oldest record from any byte of the whole file on.

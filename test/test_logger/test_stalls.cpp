@@ -77,8 +77,9 @@ void test_a_full_ring_drops_the_newest_so_that_the_begin_of_a_stall_is_kept() {
   TEST_ASSERT_TRUE(flight.finish(2'000'000));
   const ULogFile file = flight.readDurable();
   const auto imu = file.of("sensor_combined");
-  TEST_ASSERT_EQUAL(before + 2000, imu.size());
-  for (std::size_t i = 0; i < 2000; ++i) {
+  constexpr std::size_t kRing = std::tuple_element_t<0, LogStreams>::kRecords;
+  TEST_ASSERT_EQUAL(before + kRing, imu.size());
+  for (std::size_t i = 0; i < kRing; ++i) {
     TEST_ASSERT_EQUAL_UINT64(begun + i * 1000,
                              file.value<std::uint64_t>(imu[before + i], "timestamp"));
   }

@@ -175,7 +175,7 @@ void test_every_byte_of_the_file_is_in_a_block_whose_crc_holds() {
   std::uint32_t sequence = 0;
   for (const ULogFile::Record& end : file.of("log_block")) {
     const auto length = file.value<std::uint32_t>(end, "length");
-    const std::size_t blockEnd = end.messageStart + 5 + end.data.size();
+    const std::size_t blockEnd = end.messageStart + 5 + end.size;
     TEST_ASSERT_EQUAL_UINT32(blockEnd - blockStart, length);
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(4096, length);
     TEST_ASSERT_EQUAL_UINT32(77, file.value<std::uint32_t>(end, "boot_id"));

@@ -355,6 +355,30 @@ void test_the_closed_form_holds_for_every_airframe() {
   }
 }
 
+void test_throttle_goes_from_off_to_the_esc_s_maximum() {
+  for (const Airframe& airframe : kAirframes) {
+    const Vehicle& vehicle = airframe.vehicle;
+    Motors motors(vehicle);
+    motors.commandControl(wrench(100.0 * weight(vehicle), 0.0, 0.0, 0.0));
+    TEST_ASSERT_EQUAL_FLOAT(0.0F, motors.throttle());  // not armed
+    motors.arm();
+    const float idle = motors.throttle();
+    TEST_ASSERT_TRUE(idle >= 0.0F && idle < 0.35F);  // UgglanQ450 idles at 200 of 760 rad/s
+    float last = idle;
+    for (int part = 1; part <= 10; ++part) {
+      motors.commandControl(wrench(0.3 * part * weight(vehicle), 0.0, 0.0, 0.0));
+      TEST_ASSERT_TRUE(motors.throttle() >= last);
+      last = motors.throttle();
+    }
+    motors.commandControl(wrench(100.0 * weight(vehicle), 0.0, 0.0, 0.0));
+    const float cap =
+        (vehicle.commandFlightMax - vehicle.commandOff) / (vehicle.commandMax - vehicle.commandOff);
+    TEST_ASSERT_FLOAT_WITHIN(1e-6F, cap, motors.throttle());
+    motors.disarm();
+    TEST_ASSERT_EQUAL_FLOAT(0.0F, motors.throttle());
+  }
+}
+
 }  // namespace
 
 void setUp() {}
@@ -374,6 +398,7 @@ int main() {
   RUN_TEST(test_the_weight_is_carried_at_hover);
   RUN_TEST(test_the_achieved_wrench_is_what_the_commands_give);
   RUN_TEST(test_the_closed_form_holds_for_every_airframe);
+  RUN_TEST(test_throttle_goes_from_off_to_the_esc_s_maximum);
   runMotorVectorTests();
   UNITY_END();
   return 0;

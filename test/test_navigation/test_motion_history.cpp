@@ -99,7 +99,8 @@ void test_an_age_before_the_start_gives_what_has_been_since() {
     const MotionHistory history = flown(0, length, [] { return Micros{500}; });
     const Motion start = smoothFlight(0);
     const Motion end = smoothFlight(length);
-    for (const Micros age : {length, length + 1, 3 * length, MotionHistory::kSpan, 5'000'000U}) {
+    const Micros ages[] = {length, length + 1, 3 * length, MotionHistory::kSpan, 5'000'000};
+    for (const Micros age : ages) {
       if (age < length) continue;
       assertMotion(1e-5F, {end.position - start.position, end.velocity - start.velocity},
                    history.over(age));
@@ -113,7 +114,8 @@ void test_an_age_beyond_the_span_gives_the_oldest_known() {
   TEST_ASSERT_TRUE(MotionHistory::kSpan >= 500'000);  // slower than any GPS receiver's answer
   const Motion oldest = history.over(MotionHistory::kSpan);
   TEST_ASSERT_TRUE(oldest.position.norm() > 1.0F);
-  for (const Micros age : {MotionHistory::kSpan + 1, 700'000U, 2'000'000U, 0x7FFF'FFFFU}) {
+  constexpr Micros kAges[] = {MotionHistory::kSpan + 1, 700'000, 2'000'000, 0x7FFF'FFFF};
+  for (const Micros age : kAges) {
     // The same entry, once by interpolation with part 1, once by itself: rounding of a 4 m sum.
     assertMotion(2e-6F, oldest, history.over(age));
   }

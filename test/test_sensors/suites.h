@@ -5,3 +5,8 @@ void runRateTests();
 void runProcessingTests();
 void runGeodesyTests();
 void runStartCalibrationTests();
+void runNmeaTests();
+void runNmeaFixTests();
+void runBiquadTests();
+void runIcm20649Tests();
+void runIcm20649FaultTests();

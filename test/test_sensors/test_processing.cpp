@@ -75,7 +75,7 @@ void test_a_left_handed_magnetometer_shows_the_field_in_the_body() {
     const Vector3f field = rotateToBody(random.rotation(), bench.board.fieldNed);
     MagRaw raw;
     raw.field = {field.x(), -field.y(), field.z()};  // as the mounted, mirrored sensor sees it
-    assertNear(0.0F, field, bench.sensors.processMagMeas(raw));
+    assertNear(0.0F, field, bench.sensors.processMagMeas(raw, 0.0F));
   }
 }
 
@@ -90,7 +90,42 @@ void test_hard_and_soft_iron_are_taken_out_in_the_sensors_axes() {
     MagRaw raw;
     raw.field = random.vector(80.0F);
     const Vector3f iron = config.mag.softIron * (raw.field - config.mag.hardIron);
-    assertNear(1e-4F, Vector3f{-iron.x(), -iron.y(), iron.z()}, bench.sensors.processMagMeas(raw));
+    assertNear(1e-4F, Vector3f{-iron.x(), -iron.y(), iron.z()},
+               bench.sensors.processMagMeas(raw, 0.0F));
+  }
+}
+
+void test_a_calibrated_accelerometer_gives_the_true_force_in_any_mounting() {
+  Random random(46);
+  for (int i = 0; i < 500; ++i) {
+    SensorConfig config;
+    const Matrix3f skew = Vector3f{1.03F, 0.98F, 1.01F}.asDiagonal();
+    Matrix3f distortion = skew;  // what the sensor makes of the truth: symmetric
+    distortion(0, 1) = distortion(1, 0) = 0.02F;
+    distortion(1, 2) = distortion(2, 1) = -0.01F;
+    config.imu.sensorToBody = q2R(random.rotation());
+    config.imu.accelScale = distortion.inverse();
+    config.imu.accelBias = random.vector(0.5F);
+    const Bench bench(config);
+    const Vector3f force = random.vector(20.0F);
+    ImuRaw raw;
+    raw.accel = distortion * (config.imu.sensorToBody.transpose() * force) + config.imu.accelBias;
+    assertNear(2e-5F, force, bench.sensors.processIMUMeas(raw).accel);  // rounding of 35 m/s^2
+  }
+}
+
+void test_the_motors_field_is_taken_out_by_throttle() {
+  SensorConfig config;
+  config.mag.sensorToBody = diagonal(1.0F, -1.0F, 1.0F);
+  config.mag.hardIron = {12.0F, -30.0F, 5.0F};
+  config.mag.perThrottle = {30.0F, 8.0F, -20.0F};
+  const Bench bench(config);
+  MagRaw raw;
+  const Vector3f field{15.0F, 2.0F, 45.0F};  // body
+  for (const float throttle : {0.0F, 0.3F, 1.0F}) {
+    raw.field =
+        Vector3f{15.0F, -2.0F, 45.0F} + config.mag.hardIron + throttle * config.mag.perThrottle;
+    assertNear(2e-5F, field, bench.sensors.processMagMeas(raw, throttle));
   }
 }
 
@@ -219,6 +254,8 @@ void runProcessingTests() {
   RUN_TEST(test_the_imu_is_turned_into_the_body_and_freed_of_its_biases);
   RUN_TEST(test_a_left_handed_magnetometer_shows_the_field_in_the_body);
   RUN_TEST(test_hard_and_soft_iron_are_taken_out_in_the_sensors_axes);
+  RUN_TEST(test_a_calibrated_accelerometer_gives_the_true_force_in_any_mounting);
+  RUN_TEST(test_the_motors_field_is_taken_out_by_throttle);
   RUN_TEST(test_any_rotation_is_a_mounting_for_every_sensor);
   RUN_TEST(test_a_reflection_is_a_mounting_only_where_one_is_declared);
   RUN_TEST(test_a_matrix_that_stretches_or_projects_is_no_mounting);

@@ -38,22 +38,29 @@ constexpr auto kMag = [](Sensors<FakeBoard>& s, Micros now) { return s.magUpdate
 constexpr auto kAlt = [](Sensors<FakeBoard>& s, Micros now) { return s.altUpdate(now); };
 constexpr auto kGps = [](Sensors<FakeBoard>& s, Micros now) { return s.gpsUpdate(now); };
 
-void test_the_imu_is_read_1000_times_a_second() {
-  // From a device that measures every 889 us (1125 Hz), every 1000 us, beside the loop's phase or
-  // in it; with quick passes, with ones that do not divide the period, and across the wrap.
+void test_every_sample_of_an_imu_is_taken() {
+  // Of one that measures every 889 us (1125 Hz) and every 1000 us, beside the loop's phase or in
+  // it; with quick passes, with ones that do not divide the period, and across the wrap.
   for (const Micros start : {Micros{0}, kBeforeWrap}) {
-    for (const Micros period : {Micros{889}, Micros{1000}, Micros{100}}) {
+    for (const Micros period : {Micros{889}, Micros{1000}}) {
       for (const Micros offset : {Micros{0}, Micros{300}, Micros{888}}) {
-        for (const Micros pass : {Micros{50}, Micros{130}, Micros{500}}) {
+        for (const Micros pass : {Micros{50}, Micros{130}, Micros{400}}) {
           Bench bench(start);
           bench.board.imu.period = period;
           bench.board.imu.offset = offset;
           // One may be under way at either end.
-          TEST_ASSERT_UINT32_WITHIN(1, 10'000, bench.readings(10'000'000, pass, kImu));
+          TEST_ASSERT_UINT32_WITHIN(1, 10'000'000 / period, bench.readings(10'000'000, pass, kImu));
+          TEST_ASSERT_EQUAL_UINT32(0, bench.sensors.missed());
         }
       }
     }
   }
+}
+
+void test_a_device_much_faster_than_its_period_is_read_twice_as_often_at_most() {
+  Bench bench;
+  bench.board.imu.period = 100;
+  TEST_ASSERT_UINT32_WITHIN(1, 20'000, bench.readings(10'000'000, 50, kImu));
 }
 
 void test_a_reading_with_nan_or_infinity_is_none() {
@@ -72,6 +79,38 @@ void test_a_reading_with_nan_or_infinity_is_none() {
   }
   TEST_ASSERT_FALSE(bench.sensors.imuFresh(bench.board.now()));
   TEST_ASSERT_TRUE(bench.sensors.invalid() > 3000);
+}
+
+void test_a_reading_beyond_the_sensors_range_is_none_and_one_at_its_end_is_counted() {
+  Bench bench;
+  const SensorConfig& range = bench.config;
+  struct Case {
+    float& reading;
+    float end;
+    bool (*update)(Sensors<FakeBoard>&, Micros);
+    bool clips;
+  };
+  FakeBoard& board = bench.board;
+  const Case cases[] = {{board.imu.reading.accel.x(), range.accelRange, kImu, true},
+                        {board.imu.reading.accel.z(), -range.accelRange, kImu, true},
+                        {board.imu.reading.gyro.y(), -range.gyroRange, kImu, true},
+                        {board.mag.reading.field.z(), range.magRange, kMag, false},
+                        {board.alt.reading.pressure, range.highestPressure, kAlt, false},
+                        {board.alt.reading.pressure, range.lowestPressure, kAlt, false}};
+  for (const Case& c : cases) {
+    const float usual = c.reading;
+    const bool lowEnd = c.end == range.lowestPressure;
+    c.reading = c.end * (lowEnd ? 0.99F : 1.01F);
+    const std::uint32_t invalid = bench.sensors.invalid();
+    TEST_ASSERT_EQUAL_UINT32(0, bench.readings(100'000, 1000, c.update));
+    TEST_ASSERT_TRUE(bench.sensors.invalid() > invalid);
+    c.reading = c.end;
+    const std::uint32_t clipped = bench.sensors.clipped();
+    const std::uint32_t taken = bench.readings(100'000, 1000, c.update);
+    TEST_ASSERT_TRUE(taken > 0);
+    TEST_ASSERT_EQUAL_UINT32(c.clips ? taken : 0, bench.sensors.clipped() - clipped);
+    c.reading = usual;
+  }
 }
 
 void test_the_slower_sensors_keep_their_rates_too() {
@@ -94,7 +133,7 @@ void test_a_reading_comes_through_as_it_was_measured_and_only_once() {
   Bench bench(kBeforeWrap);
   Micros last = 0;
   for (int i = 0; i < 20'000; ++i) {
-    const float value = static_cast<float>(i);
+    const float value = 0.005F * static_cast<float>(i);  // within every range
     bench.board.imu.reading.accel = {value, -value, 2.0F * value};
     bench.board.imu.reading.temperature = value;
     const std::uint32_t taken = bench.board.imu.taken;
@@ -112,10 +151,11 @@ void test_a_reading_comes_through_as_it_was_measured_and_only_once() {
   }
 }
 
-void test_a_sensor_is_not_asked_before_it_is_due() {
+void test_a_sensor_is_not_asked_before_half_its_period() {
   Bench bench;
   bench.readings(1'000'000, 50, kMag);
-  TEST_ASSERT_EQUAL_UINT32(100, bench.board.mag.asked);
+  // 100 times: from 5 ms after a reading on, every 50 us up to and with the next.
+  TEST_ASSERT_UINT32_WITHIN(100, 100 * 101, bench.board.mag.asked);
 }
 
 void test_a_silent_device_is_asked_again_in_every_pass_until_it_answers() {
@@ -129,23 +169,24 @@ void test_a_silent_device_is_asked_again_in_every_pass_until_it_answers() {
   TEST_ASSERT_TRUE(bench.sensors.imuUpdate(bench.board.now()));
 }
 
-void test_after_a_silence_there_is_no_burst_of_readings_and_one_overrun() {
+void test_after_a_silence_there_is_no_burst_of_readings_and_each_missed_one_is_counted() {
   Bench bench;
-  bench.board.imu.period = 100;  // a new reading at every pass, were it asked
+  bench.board.imu.period = 1000;
   bench.readings(100'000, 100, kImu);
   bench.board.imu.dead = true;
   bench.readings(50'000, 100, kImu);
   bench.board.imu.dead = false;
-  TEST_ASSERT_EQUAL_UINT32(0, bench.sensors.overruns());
+  TEST_ASSERT_EQUAL_UINT32(0, bench.sensors.missed());
   TEST_ASSERT_UINT32_WITHIN(1, 10, bench.readings(10'000, 100, kImu));
-  TEST_ASSERT_EQUAL_UINT32(1, bench.sensors.overruns());
+  TEST_ASSERT_UINT32_WITHIN(1, 49, bench.sensors.missed());
 }
 
 void test_a_loop_too_slow_for_the_imu_counts_every_period_that_it_missed() {
   Bench bench;
-  // Every 4 ms: each reading is 3 periods late.
+  bench.board.imu.period = 1000;
+  // Every 4 ms: three between two.
   TEST_ASSERT_EQUAL_UINT32(250, bench.readings(1'000'000, 4000, kImu));
-  TEST_ASSERT_EQUAL_UINT32(249, bench.sensors.overruns());
+  TEST_ASSERT_EQUAL_UINT32(249 * 3, bench.sensors.missed());
 }
 
 struct Freshness {
@@ -220,14 +261,16 @@ void test_a_sensor_that_died_an_hour_ago_does_not_come_back_with_the_clock() {
 
 void runRateTests() {
   Unity.TestFile = __FILE__;
-  RUN_TEST(test_the_imu_is_read_1000_times_a_second);
+  RUN_TEST(test_every_sample_of_an_imu_is_taken);
+  RUN_TEST(test_a_device_much_faster_than_its_period_is_read_twice_as_often_at_most);
   RUN_TEST(test_a_reading_with_nan_or_infinity_is_none);
+  RUN_TEST(test_a_reading_beyond_the_sensors_range_is_none_and_one_at_its_end_is_counted);
   RUN_TEST(test_the_slower_sensors_keep_their_rates_too);
   RUN_TEST(test_a_device_slower_than_its_task_sets_the_rate_and_nothing_is_read_twice);
   RUN_TEST(test_a_reading_comes_through_as_it_was_measured_and_only_once);
-  RUN_TEST(test_a_sensor_is_not_asked_before_it_is_due);
+  RUN_TEST(test_a_sensor_is_not_asked_before_half_its_period);
   RUN_TEST(test_a_silent_device_is_asked_again_in_every_pass_until_it_answers);
-  RUN_TEST(test_after_a_silence_there_is_no_burst_of_readings_and_one_overrun);
+  RUN_TEST(test_after_a_silence_there_is_no_burst_of_readings_and_each_missed_one_is_counted);
   RUN_TEST(test_a_loop_too_slow_for_the_imu_counts_every_period_that_it_missed);
   RUN_TEST(test_a_sensor_never_heard_is_not_there);
   RUN_TEST(test_a_sensor_is_lost_when_its_silence_exceeds_the_limit_and_found_when_it_speaks);

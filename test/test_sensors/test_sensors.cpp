@@ -11,6 +11,11 @@ int main() {
   runProcessingTests();
   runGeodesyTests();
   runStartCalibrationTests();
+  runBiquadTests();
+  runNmeaTests();
+  runNmeaFixTests();
+  runIcm20649Tests();
+  runIcm20649FaultTests();
   UNITY_END();
   return 0;
 }

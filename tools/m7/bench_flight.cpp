@@ -49,7 +49,7 @@ class SensorBench {
     gps.courseDeg = 180.0F + 180.0F * noise_();
 
     imu_.add(counter.count([&] { imuSample_ = sensors_.processIMUMeas(imu); }));
-    mag_.add(counter.count([&] { field_ = sensors_.processMagMeas(mag); }));
+    mag_.add(counter.count([&] { field_ = sensors_.processMagMeas(mag, 0.4F); }));
     alt_.add(counter.count([&] { height_ = sensors_.processAltMeas(alt); }));
     gps_.add(counter.count([&] { gpsSample_ = sensors_.processGPSMeas(gps); }));
   }

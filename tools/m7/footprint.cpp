@@ -49,6 +49,9 @@ class BareBoard {
   [[nodiscard]] static bool readMag(strix::MagRaw& out) { return read(out); }
   [[nodiscard]] static bool readAlt(strix::AltRaw& out) { return read(out); }
   [[nodiscard]] static bool readGps(strix::GpsRaw& out) { return read(out); }
+  static void countFaults(strix::SensorFaultCounts& out) {
+    out = anything<strix::SensorFaultCounts>();
+  }
   [[nodiscard]] static strix::PilotSwitches readPilot() { return anything<strix::PilotSwitches>(); }
   static void writeEsc(const strix::EscCommands& commands) { takeAway(commands); }
   [[nodiscard]] Card& card() { return card_; }

@@ -100,7 +100,7 @@ def replay(
         end_s=found.end * 1e-6,
         log_end_s=found.logEnd * 1e-6,
         ticks=found.ticks,
-        first_difference_s=found.firstBad * 1e-6 if found.firstBad else None,
+        first_difference_s=found.firstBad * 1e-6 if found.differences else None,
         field=found.field,
         stopped_at_gap=found.gap,
         changed=tuple(changed),

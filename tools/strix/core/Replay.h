@@ -22,7 +22,7 @@ struct ReplayResult {
   std::uint32_t ticks = 0;        ///< control ticks compared
   std::uint32_t digest = 0;       ///< of the replayed ticks' hashes: equal when two runs are
   std::uint32_t differences = 0;  ///< ticks that differ, as far as they were compared
-  std::uint64_t firstBad = 0;     ///< time of the first tick that differs; 0: none
+  std::uint64_t firstBad = 0;     ///< time of the first of them
   std::string field;              ///< in which it differs first
   bool gap = false;               ///< ended where the log has lost inputs
 };
@@ -117,8 +117,12 @@ class Cursor {
   if (airframe == nullptr) {
     log.refuse("a vehicle of include/vehicles", "'" + log.info("vehicle") + "'");
   }
-  return flightConfig(airframe->vehicle, gains == nullptr ? airframe->gains : *gains, mission,
-                      loggedConfig(log).declination);
+  FlightSoftwareConfig config =
+      flightConfig(airframe->vehicle, gains == nullptr ? airframe->gains : *gains, mission,
+                   loggedConfig(log).declination);
+  const bool real = log.info("ver_hw") != SimulatedBoard<>::kName;
+  if (real) useRealSensors(config.sensors, kCalibration);
+  return config;
 }
 
 /// @tparam States  of the navigation filter

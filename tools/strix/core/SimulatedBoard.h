@@ -32,6 +32,7 @@ class SimulatedBoard {
   [[nodiscard]] bool readMag(MagRaw& out) { return take(mag_, out); }
   [[nodiscard]] bool readAlt(AltRaw& out) { return take(alt_, out); }
   [[nodiscard]] bool readGps(GpsRaw& out) { return take(gps_, out); }
+  void countFaults(SensorFaultCounts& /*out*/) const {}  // nothing is in the way here
   [[nodiscard]] PilotSwitches readPilot() const { return pilot_; }
   void writeEsc(const EscCommands& commands) { esc_ = commands; }
   [[nodiscard]] Card& card() { return card_; }

@@ -5,6 +5,7 @@
 
 void bindConsistency(nanobind::module_& m);
 void bindEstimator(nanobind::module_& m);
+void bindFilters(nanobind::module_& m);
 void bindFlight(nanobind::module_& m);
 void bindReplay(nanobind::module_& m);
 void bindVehicles(nanobind::module_& m);

@@ -5,6 +5,7 @@ NB_MODULE(_core, m) {
   m.doc() = "The Strix flight code, compiled for this machine";
   bindEstimator(m);
   bindConsistency(m);  // of whose types it speaks
+  bindFilters(m);
   bindFlight(m);
   bindReplay(m);
   bindVehicles(m);

@@ -50,6 +50,7 @@ void bindReplay(nb::module_& m) {
       .def_ro("logEnd", &ReplayResult::logEnd)
       .def_ro("ticks", &ReplayResult::ticks)
       .def_ro("digest", &ReplayResult::digest)
+      .def_ro("differences", &ReplayResult::differences)
       .def_ro("firstBad", &ReplayResult::firstBad)
       .def_ro("field", &ReplayResult::field)
       .def_ro("gap", &ReplayResult::gap);

@@ -5,18 +5,21 @@
 
 namespace strix {
 
-/// body = sensorToBody (raw - bias)
+/// body = sensorToBody accelScale (raw - accelBias)
 struct ImuCalibration {
   Matrix3f sensorToBody = Matrix3f::Identity();  ///< a rotation: +1 determinant
+  Matrix3f accelScale = Matrix3f::Identity();    ///< scale and skew, symmetric: it turns nothing
   Vector3f accelBias = Vector3f::Zero();         ///< m/s^2, sensor axes
 };
 
-/// body = sensorToBody softIron (raw - hardIron)
+/// body = sensorToBody softIron (raw - hardIron - perThrottle throttle)
 struct MagCalibration {
   /// May be a reflection (determinant -1): the LIS2MDL's axes are left-handed.
   Matrix3f sensorToBody = Matrix3f::Identity();
   Vector3f hardIron = Vector3f::Zero();  ///< uT, sensor axes
   Matrix3f softIron = Matrix3f::Identity();
+  Vector3f perThrottle =
+      Vector3f::Zero();  ///< uT, sensor axes: the motors' current at full throttle
 };
 
 /// True when m turns vectors without stretching them: m m^T = I within 1e-4 (a matrix typed with

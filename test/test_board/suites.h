@@ -1,0 +1,10 @@
+/// The parts of this suite; test_board.cpp runs them.
+#pragma once
+
+void runI2cBusTests();
+void runI2cFaultTests();
+void runImuTests();
+void runMagTests();
+void runBaroTests();
+void runSensorFaultTests();
+void runGpsTests();

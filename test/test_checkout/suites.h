@@ -1,0 +1,9 @@
+/// The parts of this suite; test_checkout.cpp runs them.
+#pragma once
+
+void runTextTests();
+void runSensorTests();
+void runMotorTests();
+void runAxisTests();
+void runManualTests();
+void runHeapTests();
