@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from strix.calibrate.cli import calibrate_app
 from strix.command import says_what_is_wrong
 from strix.log import cli_view
 from strix.log.cli import log_app
@@ -22,6 +23,7 @@ app = typer.Typer(
 )
 
 app.add_typer(log_app, name="log")
+app.add_typer(calibrate_app, name="calibrate")
 app.command(epilog="Example: strix convert out/flight.ulg -o flight.mcap")(cli_view.convert)
 
 
@@ -191,6 +193,22 @@ def options(
 
     for table in write_figures(out):
         print(table)
+
+
+@app.command(epilog="Example: strix wiring --out docs/figures")
+@says_what_is_wrong
+def wiring(
+    board: Annotated[Path, typer.Option(help="Folder with Pins.h and SpiBus.h")] = Path(
+        "src/board"
+    ),
+    vehicle: Annotated[str, typer.Option(help="Airframe, of include/vehicles/")] = "Quad5in",
+    out: Annotated[Path, typer.Option(help="Folder for the drawings")] = Path("docs/figures"),
+) -> None:
+    """Draw the wiring diagram from the pins that the firmware is compiled with."""
+    from strix.wiring import write_wiring
+
+    for path in write_wiring(board, vehicle, out):
+        print(path)
 
 
 @app.command(epilog="Example: strix gains --vehicle Quad5in --check")

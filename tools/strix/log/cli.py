@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from strix.command import reading, says_what_is_wrong
-from strix.log import cli_view
+from strix.log import cli_spectrum, cli_view
 
 log_app = typer.Typer(
     name="log",
@@ -65,4 +65,7 @@ log_app.command(epilog="Example: strix log tail out/flight.ulg vehicle_attitude 
 )
 log_app.command(epilog="Example: strix log plot out/flight.ulg vehicle_local_position.z -o z.png")(
     cli_view.plot
+)
+log_app.command(epilog="Example: strix log spectrum out/flight.ulg --topic gyro -o spectrum.png")(
+    cli_spectrum.spectrum
 )
