@@ -153,7 +153,7 @@ class FlightSoftware {
     motors_.writeESC(board_);
     controller_.setAchieved(motors_.achieved());
     navigation_.setMotors(motorState(now));
-    gyroFilter_.setMotorSpeed(motors_.meanRevolutions());
+    if (gyroFilter_.active()) gyroFilter_.setMotorSpeed(motors_.meanRevolutions());
     lastTick_ = tick(now, time);
     logger_.logGNC(toRecords(time, estimate, reference, controller_, motors_, lastTick_));
     logNavigation(now, time);

@@ -155,9 +155,8 @@ template <class Card>
 void Logger<Card>::logText(ulog::LogLevel level, LogTime now, std::string_view text) {
   ulog::Message message('L');
   message.add(level).add(now).addText(text.substr(0, kTextLength));
-  typename TextRing::Record record{};
-  std::memcpy(record.data(), message.data(), message.size());
-  texts_.push(record);
+  std::uint8_t* const record = texts_.add();
+  if (record != nullptr) std::memcpy(record, message.data(), message.size());
 }
 
 template <class Card>

@@ -29,7 +29,8 @@ enum class LogLevel : char { Error = '3', Warning = '4', Notice = '5', Info = '6
 /// One message, built field by field. What would exceed kMaxMessage is left out.
 class Message {
  public:
-  explicit Message(char type) {
+  // Bytes behind size() are never read: they need not be cleared.
+  explicit Message(char type) {  // NOLINT(cppcoreguidelines-pro-type-member-init)
     add(std::uint16_t{0});
     add(type);
   }
@@ -56,7 +57,7 @@ class Message {
     return *this;
   }
 
-  std::array<std::uint8_t, kMaxMessage> bytes_{};
+  std::array<std::uint8_t, kMaxMessage> bytes_;
   std::size_t size_ = 0;
 };
 

@@ -81,6 +81,7 @@ class GyroFilter {
   GyroFilter(const GyroFilterConfig& config, float sampleHz, float controlHz,
              float motorTimeConstant)
       : valid_(isGyroFilter(config, sampleHz)),
+        active_(valid_ && (config.lowPass > 0.0F || config.notchMax > 0.0F)),
         lagGain_(1.0F / (1.0F + motorTimeConstant * controlHz)),
         throttleNotch_(valid_ ? config : GyroFilterConfig{}, sampleHz) {
     if (valid_ && config.lowPass > 0.0F)
@@ -88,6 +89,8 @@ class GyroFilter {
   }
 
   [[nodiscard]] bool valid() const { return valid_; }
+  /// False when it passes everything on as it is.
+  [[nodiscard]] bool active() const { return active_; }
 
   /// The motors come after their command, and so does the notch.
   /// @param commanded  mean speed the ESCs are told, rev/s
@@ -97,9 +100,10 @@ class GyroFilter {
     throttleNotch_.setMotorSpeed(motorSpeed_);
   }
 
-  /// A sample with NaN or infinity is left out: the last output stays.
+  /// A sample with NaN or infinity is left out by an active filter: the last output stays.
   /// @param gyro  rad/s, any axes    @return the same, filtered
   [[nodiscard]] Vector3f update(const Vector3f& gyro) {
+    if (!active_) return gyro;
     if (isFinite(gyro)) output_ = throttleNotch_.update(lowPass_.update(gyro));
     return output_;
   }
@@ -109,6 +113,7 @@ class GyroFilter {
 
  private:
   bool valid_;
+  bool active_;
   float lagGain_;
   float motorSpeed_ = 0.0F;
   Biquad lowPass_;

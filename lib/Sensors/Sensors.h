@@ -4,8 +4,10 @@
 /// as it came, processXMeas() turns it into what the filter uses: body axes, SI, bias removed.
 #pragma once
 
+#include <cmath>
 #include "Geodesy.h"
 #include "RawSamples.h"
+
 #include "SensorCalibration.h"
 
 namespace strix {
@@ -92,6 +94,8 @@ class Sensors {
   Sensors(Board& board, const SensorConfig& config)
       : board_(board),
         config_(config),
+        accelToBody_(config.imu.sensorToBody * config.imu.accelScale),
+        magToBody_(config.mag.sensorToBody * config.mag.softIron),
         imuTiming_(config.imuPeriod, config.imuTimeout),
         magTiming_(config.magPeriod, config.magTimeout),
         altTiming_(config.altPeriod, config.altTimeout),
@@ -150,17 +154,14 @@ class Sensors {
   [[nodiscard]] const GpsRaw& getGPSMeas() const { return gpsRaw_; }
 
   [[nodiscard]] ImuSample processIMUMeas(const ImuRaw& raw) const {
-    const Vector3f accel = config_.imu.accelScale * (raw.accel - config_.imu.accelBias);
-    return {raw.sampled, config_.imu.sensorToBody * accel,
+    return {raw.sampled, accelToBody_ * (raw.accel - config_.imu.accelBias),
             config_.imu.sensorToBody * raw.gyro - gyroBias_};
   }
 
   /// @param throttle  mean of the motors' commands, 0 to 1 (Motors::throttle)
   /// @return field in body axes, uT
   [[nodiscard]] Vector3f processMagMeas(const MagRaw& raw, float throttle) const {
-    const MagCalibration& mag = config_.mag;
-    const Vector3f hardIron = mag.hardIron + throttle * mag.perThrottle;
-    return mag.sensorToBody * (mag.softIron * (raw.field - hardIron));
+    return magToBody_ * (raw.field - config_.mag.hardIron - throttle * config_.mag.perThrottle);
   }
 
   /// @return height above the ground of the start-up calibration, m
@@ -218,7 +219,7 @@ class Sensors {
 
   /// False also for NaN.
   [[nodiscard]] static bool within(const Vector3f& v, float range) {
-    const auto inside = [range](float x) { return x >= -range && x <= range; };
+    const auto inside = [range](float x) { return std::fabs(x) <= range; };
     return inside(v.x()) && inside(v.y()) && inside(v.z());
   }
 
@@ -230,6 +231,8 @@ class Sensors {
 
   Board& board_;
   SensorConfig config_;
+  Matrix3f accelToBody_;
+  Matrix3f magToBody_;
   SensorTiming imuTiming_;
   SensorTiming magTiming_;
   SensorTiming altTiming_;

@@ -61,7 +61,7 @@ struct IMXRT_LPI2C_t {
                             [](Master& m, std::uint32_t value) { m.clockBits = value; }};
   strix::FakeRegister MFSR{port, [](Master& m) { return m.fifoCounts(); },
                            [](Master& /*m*/, std::uint32_t /*value*/) {}};
-  strix::FakeRegister MTDR{port, [](Master& /*m*/) { return 0U; },
+  strix::FakeRegister MTDR{port, [](Master& /*m*/) { return std::uint32_t{0}; },
                            [](Master& m, std::uint32_t word) { m.command(word); }};
   strix::FakeRegister MRDR{port, [](Master& m) { return m.receive(); },
                            [](Master& /*m*/, std::uint32_t /*value*/) {}};

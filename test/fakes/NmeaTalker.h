@@ -39,12 +39,12 @@ inline std::string nmeaAngleText(std::int64_t minutes, int decimals, int degreeD
 
 /// What a receiver says of one moment.
 struct NmeaMoment {
-  std::uint32_t time = 43'200'000;     ///< UTC, ms of the day
+  unsigned time = 43'200'000;          ///< UTC, ms of the day
   std::int64_t latitude = 34'452'000;  ///< 1e-4 min, north: 57 deg 25.2 min
   std::int64_t longitude = 7'182'000;  ///< 1e-4 min, east: 11 deg 58.2 min
-  std::int32_t altitude = 400;         ///< dm
-  std::uint32_t speed = 0;             ///< hundredths of a knot
-  std::uint32_t course = 0;            ///< hundredths of a degree
+  int altitude = 400;                  ///< dm
+  unsigned speed = 0;                  ///< hundredths of a knot
+  unsigned course = 0;                 ///< hundredths of a degree
   int satellites = 11;
   int dimensions = 3;  ///< 1 is no fix
 

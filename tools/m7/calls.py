@@ -11,6 +11,7 @@ from linked import Image, drawn_in, instructions, readable, references, symbols
 # arguments), which is no promise of the next.
 ALLOWED = {
     "memcpy": "moves bytes",
+    "memcmp": "compares bytes",
     "memmove": "moves bytes",
     "memset": "sets bytes",
     "strlen": "length of a text",
