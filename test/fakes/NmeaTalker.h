@@ -88,6 +88,7 @@ class NmeaTalker {
   int ignoring = -1;              ///< this command is acknowledged but changes nothing
   int lostAfterNewSpeed = 0;      ///< commands it misses after each change of speed
   std::uint32_t garbleEvery = 0;  ///< flips one bit of every so many bytes
+  std::uint64_t nextEpoch = 0;    ///< us, when it speaks next
 
   // Read by the test.
   std::uint32_t speed = 9600;      ///< baud
@@ -113,9 +114,9 @@ class NmeaTalker {
 
   /// Lets time pass. @param now  us, never less than before
   void run(std::uint64_t now) {
-    while (nextEpoch_ <= now) {
-      if (!silent) speak(nextEpoch_);
-      nextEpoch_ += 1000U * std::uint64_t{period};
+    while (nextEpoch <= now) {
+      if (!silent) speak(nextEpoch);
+      nextEpoch += 1000U * std::uint64_t{period};
     }
   }
 
@@ -195,7 +196,6 @@ class NmeaTalker {
     sinceFix_ = 0;
   }
 
-  std::uint64_t nextEpoch_ = 0;
   std::uint32_t sinceFix_ = 0;  ///< ms
   std::string heard_;
   std::uint32_t said_ = 0;

@@ -13,7 +13,10 @@ constexpr std::uint32_t kSilentBound = 1000;  // ms, GpsMtk3333::begin
 constexpr std::uint32_t kLateBound = 3100;    // ms
 
 struct Bench {
-  explicit Bench(Micros start = 300'000) { powerUpTeensy(start); }
+  explicit Bench(Micros start = 300'000) {
+    powerUpTeensy(start);
+    talker.nextEpoch = start - start % 1'000'000;  // powered with it, not an hour before
+  }
 
   NmeaTalker talker;
   HardwareSerialIMXRT port{talker};
