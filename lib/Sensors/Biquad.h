@@ -68,7 +68,7 @@ class Biquad {
   [[nodiscard]] Vector3f update(const Vector3f& input) {
     if (!isFinite(input)) return output1_;
     if (!started_) settle(input);
-    const Vector3f output =
+    Vector3f output =
         c_.b0 * input + c_.b1 * input1_ + c_.b2 * input2_ - c_.a1 * output1_ - c_.a2 * output2_;
     if (!isFinite(output)) {  // overflow, by numbers that no sensor gives
       settle(input);

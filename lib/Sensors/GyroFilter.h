@@ -28,7 +28,7 @@ constexpr std::size_t kMostNotches = 3;
   if (config.notchMin == 0.0F && config.notchMax == 0.0F) return true;
   return config.notchHarmonics >= 1 && config.notchHarmonics <= kMostNotches &&
          config.notchMin <= config.notchMax && isFilterFrequency(config.notchMin, sampleHz) &&
-         isFilterFrequency(config.notchHarmonics * config.notchMax, sampleHz) &&
+         isFilterFrequency(static_cast<float>(config.notchHarmonics) * config.notchMax, sampleHz) &&
          config.notchQ >= 1.0F && config.notchQ <= 20.0F;
 }
 
