@@ -1,13 +1,14 @@
 /// Rates, staleness and processing of the four sensors.
 ///
-/// xUpdate(now) asks the board for a new reading when its period is up, getXMeas() is that reading
-/// as it came, processXMeas() turns it into what the filter uses: body axes, SI, bias removed.
+/// xUpdate(now) asks the board for a new reading from half its period on, getXMeas() is that
+/// reading as it came, processXMeas() turns it into what the filter uses: body axes, SI, bias
+/// removed.
 #pragma once
 
 #include <cmath>
+
 #include "Geodesy.h"
 #include "RawSamples.h"
-
 #include "SensorCalibration.h"
 
 namespace strix {

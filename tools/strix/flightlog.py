@@ -134,15 +134,20 @@ def _with_time(ulog: ULog) -> list[ULog.Data]:
     return [topic for topic in ulog.data_list if "timestamp" in topic.data]
 
 
-def _topic(where: str, columns: Mapping[str, NDArray[Any]]) -> Topic:
-    time_s = columns["timestamp"] * 1e-6
+def refuse_backwards(where: str, what: str, time_s: Array) -> None:
+    """Time that goes back: whoever wrote it was confused, or the file is damaged."""
     backwards = np.flatnonzero(np.diff(time_s) < 0.0)
     if backwards.size:
         row = int(backwards[0])
         raise BadInput(
-            f"{where}, record {row + 2}: expected a time of at least {time_s[row]:.6f} s "
+            f"{where}, record {row + 2}: expected a {what} of at least {time_s[row]:.6f} s "
             f"(that of the record before), found {time_s[row + 1]:.6f} s"
         )
+
+
+def _topic(where: str, columns: Mapping[str, NDArray[Any]]) -> Topic:
+    time_s = columns["timestamp"] * 1e-6
+    refuse_backwards(where, "time", time_s)
     elements: dict[str, list[NDArray[Any]]] = {}
     for column, values in columns.items():
         elements.setdefault(re.sub(r"\[\d+\]$", "", column), []).append(values)

@@ -15,21 +15,14 @@ import bench
 import mca
 from bench import Measured, legend, measure, table, write_results
 from counts import Count, Limit, complaints, in_order, parse_counts, read_budget
+from m7_rig import needs_rig
 from mca import Estimate, EstimateError, estimate, estimates
 
-from m7 import MissingToolError, build, require_tools, run
+from m7 import build, run
 
 PREDICT = Count("predict", 18, 0, 64, 2000, 2000, 2000, 2000, 5)
 HEIGHT = Count("updateAltMeas", 18, 1, 64, 900, 899, 890, 910, 9)
 PUSH = Count("logIMU", 0, 0, 10, 59, 60, 59, 61, 3)
-
-
-def missing_rig() -> str:
-    try:
-        require_tools()
-    except MissingToolError as missing:
-        return str(missing)
-    return ""
 
 
 def missing_llvm() -> str:
@@ -40,7 +33,6 @@ def missing_llvm() -> str:
     return ""
 
 
-needs_rig = pytest.mark.skipif(bool(missing_rig()), reason=missing_rig())
 needs_llvm = pytest.mark.skipif(bool(missing_llvm()), reason=missing_llvm())
 
 

@@ -15,6 +15,7 @@ import footprint
 from calls import double_precision, foreign_calls
 from footprint import Footprint, complaints, size_table, stack_table, take, write_results
 from linked import CALL_GRAPH, Image, instructions, link_alone
+from m7_rig import needs_rig
 from sizes import measure
 from stack import (
     INTERRUPTS,
@@ -29,18 +30,7 @@ from stack import (
     stack_complaints,
 )
 
-from m7 import MissingToolError, build, must, object_of, require_tools, run
-
-
-def missing_tool() -> str:
-    try:
-        require_tools()
-    except MissingToolError as missing:
-        return str(missing)
-    return ""
-
-
-needs_rig = pytest.mark.skipif(bool(missing_tool()), reason=missing_tool())
+from m7 import build, must, object_of, run
 
 
 @pytest.fixture(scope="module")

@@ -9,18 +9,9 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1] / "m7"))
 
-from m7 import BuildError, MissingToolError, Run, build, require_tools, run
+from m7_rig import needs_rig
 
-
-def missing_tool() -> str:
-    try:
-        require_tools()
-    except MissingToolError as missing:
-        return str(missing)
-    return ""
-
-
-needs_rig = pytest.mark.skipif(bool(missing_tool()), reason=missing_tool())
+from m7 import BuildError, Run, build, run
 
 
 def run_program(folder: Path, source: str) -> Run:

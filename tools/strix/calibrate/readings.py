@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from strix.calibrate.outcome import GRAVITY_M_S2
 from strix.errors import BadInput
-from strix.flightlog import Array, FlightLog, Topic, read_flight_log
+from strix.flightlog import Array, FlightLog, Topic, read_flight_log, refuse_backwards
 from strix.recording import Recording, read_recording
 
 # Full scale as src/board sets the IMU up (ImuIcm20649.cpp: 30 g, 2000 deg/s), and of the LIS2MDL:
@@ -196,13 +196,7 @@ def _sampled_s(topic: Topic) -> Array:
 
 def _check_vectors(where: str, field: str, time_s: Array, values: Array) -> None:
     refuse_not_finite(where, field, values)
-    backwards = np.flatnonzero(np.diff(time_s) < 0.0)
-    if backwards.size:
-        row = int(backwards[0])
-        raise BadInput(
-            f"{where}, record {row + 2}: expected a sample time of at least {time_s[row]:.6f} s "
-            f"(that of the record before), found {time_s[row + 1]:.6f} s"
-        )
+    refuse_backwards(where, "sample time", time_s)
     _refuse_stuck(where, field, time_s, values)
 
 
