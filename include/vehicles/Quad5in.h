@@ -26,6 +26,8 @@ constexpr Vehicle kQuad5in{
     1950.0F,  // most the ESC accepts
     1700.0F,  // flight cap: 69 % of 1150..1950, 327 rev/s, 3.5 weights
     60.0F,    // ours: 3600 rev/min, 12 % of the weight; slow enough to sink, too fast to lose sync
+    22.8F,    // ours: V, 3.8 a cell, half full
+    6,
     // ours: the ratios are what counts, tuned with `strix gains` for a position step that settles
     // within 10 s without overshoot and for 45 deg and 6 dB with the motor lag, which the design
     // does not know: a small acceptable torque keeps the rate loop, 11 rad/s, below the motors' 25.
@@ -41,6 +43,26 @@ constexpr Vehicle kQuad5in{
         2.0F,   // N, thrust
         0.01F,  // N m, roll and pitch torque
         0.02F,  // N m, yaw torque
+        3.0F,   // m s, integral of position, horizontal
+        3.0F,   // m s, integral of position, vertical
+        1.0F,   // rad s, integral of yaw
+    },
+    // ours: for designs that do not know the lag.
+    {
+        1.0F,   // m, position, horizontal
+        1.0F,   // m, position, vertical
+        1.3F,   // m/s, velocity, horizontal
+        1.0F,   // m/s, velocity, vertical
+        0.5F,   // rad, tilt
+        0.3F,   // rad, yaw
+        0.4F,   // rad/s, roll and pitch rate
+        0.6F,   // rad/s, yaw rate
+        2.0F,   // N, thrust
+        0.01F,  // N m, roll and pitch torque
+        0.02F,  // N m, yaw torque
+        3.0F,   // m s, integral of position, horizontal
+        3.0F,   // m s, integral of position, vertical
+        1.0F,   // rad s, integral of yaw
     },
 };
 

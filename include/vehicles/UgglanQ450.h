@@ -26,6 +26,8 @@ constexpr Vehicle kUgglanQ450{
     32767.0F,  // int16
     31000.0F,  // ours: 714 rad/s, 1.6 weights; the rest is kept for a sagging battery
     220.0F,    // ours: 10 % above the 200 rad/s at which the motor stops
+    11.4F,     // ours: V, 3.8 a cell, half full
+    3,
     // ours: as for Quad5in, and slower, because the motors lag twice as long.
     {
         2.5F,   // m, position, horizontal
@@ -39,6 +41,26 @@ constexpr Vehicle kUgglanQ450{
         2.0F,   // N, thrust
         0.01F,  // N m, roll and pitch torque
         0.05F,  // N m, yaw torque
+        3.0F,   // m s, integral of position, horizontal
+        3.0F,   // m s, integral of position, vertical
+        1.0F,   // rad s, integral of yaw
+    },
+    // ours: for designs that do not know the lag.
+    {
+        2.5F,   // m, position, horizontal
+        1.0F,   // m, position, vertical
+        1.6F,   // m/s, velocity, horizontal
+        1.0F,   // m/s, velocity, vertical
+        0.5F,   // rad, tilt
+        0.3F,   // rad, yaw
+        0.2F,   // rad/s, roll and pitch rate
+        0.4F,   // rad/s, yaw rate
+        2.0F,   // N, thrust
+        0.01F,  // N m, roll and pitch torque
+        0.05F,  // N m, yaw torque
+        3.0F,   // m s, integral of position, horizontal
+        3.0F,   // m s, integral of position, vertical
+        1.0F,   // rad s, integral of yaw
     },
 };
 

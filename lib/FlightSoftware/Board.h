@@ -13,9 +13,12 @@
 ///   bool readMag(MagRaw&);              there. Never waits for one; how long each may take at
 ///   bool readAlt(AltRaw&);              worst is the board's stated bound.
 ///   bool readGps(GpsRaw&);
+///   bool readBattery(BatteryRaw&);      the same; a board that cannot measure it returns false for
+///   bool readEscStatus(EscRaw&);        ever
 ///   void countFaults(SensorFaultCounts&);
 ///                                       fills in the rows of its devices and buses
 ///   PilotSwitches readPilot();          the pilot's switches as they are now
+///   PilotSticks readSticks();           the pilot's sticks as they are now
 ///   void writeEsc(const EscCommands&);  M1..M4 in the vehicle's command unit; takes effect at the
 ///                                       next ESC frame
 ///   Card& card();                       the log's block device (lib/Logger/BlockDevice.h)
@@ -33,6 +36,15 @@ struct PilotSwitches {
   bool arm = false;
   bool kill = false;   ///< motors off now, whatever else
   bool start = false;  ///< begin the mission
+};
+
+/// Stick positions. Without a receiver, or when it is lost, they are not valid.
+struct PilotSticks {
+  float roll = 0.0F;      ///< -1 to 1, right positive
+  float pitch = 0.0F;     ///< -1 to 1, pulled back positive: nose up
+  float yaw = 0.0F;       ///< -1 to 1, right positive
+  float throttle = 0.0F;  ///< 0 to 1
+  bool valid = false;
 };
 
 /// Devices that answered with the right identity at start.

@@ -43,6 +43,10 @@ struct BrysonWeights {
   float thrust;              ///< N
   float torque;              ///< N m, roll and pitch
   float yawTorque;           ///< N m
+  // Of the time integrals, for designs with integral action.
+  float integralHorizontal;  ///< m s
+  float integralVertical;    ///< m s
+  float integralYaw;         ///< rad s
 };
 
 struct Vehicle {
@@ -56,11 +60,14 @@ struct Vehicle {
   float motorTimeConstant;                ///< s
   CommandCurve command;                   ///< ESC command of rotor speed
   const char* commandUnit;
-  float commandOff;        ///< motors stopped
-  float commandMax;        ///< what the ESC accepts
-  float commandFlightMax;  ///< cap in flight
-  float speedFlightMin;    ///< n below which a motor never runs in flight
-  BrysonWeights bryson;
+  float commandOff;           ///< motors stopped
+  float commandMax;           ///< what the ESC accepts
+  float commandFlightMax;     ///< cap in flight
+  float speedFlightMin;       ///< n below which a motor never runs in flight
+  float curveVoltage;         ///< V, battery voltage at which the command curve holds
+  std::uint8_t batteryCells;  ///< in series
+  BrysonWeights bryson;       ///< for designs that know the motor lag
+  BrysonWeights brysonNoLag;  ///< for designs that do not: gentler
 };
 
 }  // namespace strix

@@ -1,6 +1,8 @@
 /// What the estimator tells the controller and the log.
 #pragma once
 
+#include <cstdint>
+
 #include "Quaternion.h"
 
 namespace strix {
@@ -13,6 +15,13 @@ struct VehicleState {
   Vector3f rateBody = Vector3f::Zero();     ///< rad/s, FRD
 };
 
+/// What a reference asks for.
+enum class ReferenceMode : std::uint8_t {
+  Position,        ///< position, velocity, acceleration and yaw; the attitude follows from them
+  AttitudeHeight,  ///< attitude; height, sink rate and vertical acceleration; no place
+  Attitude,        ///< attitude and thrust as given: the attitude stand, a pilot's sticks
+};
+
 /// Where the aircraft should be: what guidance asks of the controller.
 struct Reference {
   Vector3f positionNed = Vector3f::Zero();      ///< m
@@ -20,6 +29,9 @@ struct Reference {
   float yaw = 0.0F;                             ///< rad
   float yawRate = 0.0F;                         ///< rad/s
   Vector3f accelerationNed = Vector3f::Zero();  ///< m/s^2, fed forward
+  ReferenceMode mode = ReferenceMode::Position;
+  Quaternion attitude{};  ///< body to NED; not in Position
+  float thrust = 0.0F;    ///< N, along -z body; in Attitude only
 };
 
 }  // namespace strix

@@ -2,6 +2,8 @@
 /// These are the inputs of the flight code; the log keeps every one of them.
 #pragma once
 
+#include <array>
+
 #include "Time.h"
 #include "Vector3f.h"
 
@@ -36,6 +38,22 @@ struct GpsRaw {
   float hdop = 99.0F;
   std::uint8_t fix = 0;  ///< 0 none, 2 two-dimensional, 3 three-dimensional
   std::uint8_t satellites = 0;
+};
+
+/// What the battery gives, where the board can measure it.
+struct BatteryRaw {
+  Micros sampled = 0;
+  float voltage = 0.0F;  ///< V
+  float current = 0.0F;  ///< A; 0 when it is not measured
+};
+
+/// What ESCs that answer tell of M1..M4; NaN for what one does not tell.
+struct EscRaw {
+  Micros sampled = 0;
+  std::array<float, 4> revolutions{};  ///< rev/s of the rotor
+  std::array<float, 4> voltage{};      ///< V
+  std::array<float, 4> temperature{};  ///< degC
+  std::array<float, 4> current{};      ///< A
 };
 
 }  // namespace strix

@@ -39,6 +39,11 @@ class TeensyBoard {
   [[nodiscard]] bool readAlt(AltRaw& out) { return baro_.read(out); }
   [[nodiscard]] bool readGps(GpsRaw& out) { return gps_.read(out); }
 
+  // Not fitted on this aircraft: PWM ESCs do not answer.
+  [[nodiscard]] static bool readBattery(BatteryRaw& /*out*/) { return false; }
+  [[nodiscard]] static bool readEscStatus(EscRaw& /*out*/) { return false; }
+  [[nodiscard]] static PilotSticks readSticks() { return {}; }
+
   void countFaults(SensorFaultCounts& out) const;
 
   [[nodiscard]] PilotSwitches readPilot();

@@ -60,6 +60,9 @@ class BasicFakeBoard {
   FakeDevice<GpsRaw> gps{100'000};
   SensorSet found{true, true, true, true, true};  ///< what begin() reports
   PilotSwitches pilot;
+  PilotSticks sticks;
+  FakeDevice<BatteryRaw> battery{100'000};
+  FakeDevice<EscRaw> escs{200'000};
   SensorFaultCounts faults;  ///< of its devices
   Card sd;
   Vector3f gyroBias{0.01F, -0.02F, 0.015F};     ///< rad/s; used by hold()
@@ -82,6 +85,8 @@ class BasicFakeBoard {
     gps.reading.hdop = 0.9F;
     gps.reading.fix = 3;
     gps.reading.satellites = 11;
+    battery.dead = true;  // as on a board that cannot measure it
+    escs.dead = true;
   }
 
   /// Readings of an aircraft that stays where it is, with this attitude and rate.
@@ -114,6 +119,9 @@ class BasicFakeBoard {
   [[nodiscard]] bool readMag(MagRaw& out) { return mag.read(time_, start_, out); }
   [[nodiscard]] bool readAlt(AltRaw& out) { return alt.read(time_, start_, out); }
   [[nodiscard]] bool readGps(GpsRaw& out) { return gps.read(time_, start_, out); }
+  [[nodiscard]] bool readBattery(BatteryRaw& out) { return battery.read(time_, start_, out); }
+  [[nodiscard]] bool readEscStatus(EscRaw& out) { return escs.read(time_, start_, out); }
+  [[nodiscard]] PilotSticks readSticks() const { return sticks; }
   void countFaults(SensorFaultCounts& out) const { out = faults; }
   [[nodiscard]] PilotSwitches readPilot() const { return pilot; }
   void writeEsc(const EscCommands& commands) { escWrites.push_back({time_, commands}); }

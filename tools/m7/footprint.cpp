@@ -49,6 +49,8 @@ class BareBoard {
   [[nodiscard]] static bool readMag(strix::MagRaw& out) { return read(out); }
   [[nodiscard]] static bool readAlt(strix::AltRaw& out) { return read(out); }
   [[nodiscard]] static bool readGps(strix::GpsRaw& out) { return read(out); }
+  [[nodiscard]] static bool readBattery(strix::BatteryRaw& out) { return read(out); }
+  [[nodiscard]] static bool readEscStatus(strix::EscRaw& out) { return read(out); }
   static void countFaults(strix::SensorFaultCounts& out) {
     out = anything<strix::SensorFaultCounts>();
   }

@@ -32,6 +32,9 @@ class SimulatedBoard {
   [[nodiscard]] bool readMag(MagRaw& out) { return take(mag_, out); }
   [[nodiscard]] bool readAlt(AltRaw& out) { return take(alt_, out); }
   [[nodiscard]] bool readGps(GpsRaw& out) { return take(gps_, out); }
+  [[nodiscard]] bool readBattery(BatteryRaw& out) { return take(battery_, out); }
+  [[nodiscard]] bool readEscStatus(EscRaw& out) { return take(escs_, out); }
+  [[nodiscard]] PilotSticks readSticks() const { return sticks_; }
   void countFaults(SensorFaultCounts& /*out*/) const {}  // nothing is in the way here
   [[nodiscard]] PilotSwitches readPilot() const { return pilot_; }
   void writeEsc(const EscCommands& commands) { esc_ = commands; }
@@ -45,6 +48,9 @@ class SimulatedBoard {
   void put(const MagRaw& reading) { mag_ = reading; }
   void put(const AltRaw& reading) { alt_ = reading; }
   void put(const GpsRaw& reading) { gps_ = reading; }
+  void put(const BatteryRaw& reading) { battery_ = reading; }
+  void put(const EscRaw& reading) { escs_ = reading; }
+  void setSticks(const PilotSticks& sticks) { sticks_ = sticks; }
   [[nodiscard]] const EscCommands& esc() const { return esc_; }
 
  private:
@@ -65,6 +71,9 @@ class SimulatedBoard {
   std::optional<MagRaw> mag_;
   std::optional<AltRaw> alt_;
   std::optional<GpsRaw> gps_;
+  std::optional<BatteryRaw> battery_;
+  std::optional<EscRaw> escs_;
+  PilotSticks sticks_;
   EscCommands esc_{};
 };
 

@@ -83,6 +83,13 @@ class Flight {
   void putAlt(strix::Micros sampled, float pressure, float temperature) {
     board_.put(strix::AltRaw{sampled, pressure, temperature});
   }
+  void putBattery(strix::Micros sampled, float voltage, float current) {
+    board_.put(strix::BatteryRaw{sampled, voltage, current});
+  }
+  void putEscStatus(strix::Micros sampled, const Array4& revolutions, const Array4& voltage,
+                    const Array4& temperature, const Array4& current) {
+    board_.put(strix::EscRaw{sampled, revolutions, voltage, temperature, current});
+  }
   void putGps(strix::Micros sampled, std::int32_t latitude, std::int32_t longitude,
               std::int32_t altitude, float speedKnots, float courseDeg, float hdop,
               std::uint8_t fix, std::uint8_t satellites) {
@@ -135,6 +142,9 @@ void bindFlight(nb::module_& m) {
       .def("put_alt", &Flight::putAlt, "sampled_us"_a, "pressure_pa"_a, "temperature_degc"_a)
       .def("put_gps", &Flight::putGps, "sampled_us"_a, "latitude_1e7_deg"_a, "longitude_1e7_deg"_a,
            "altitude_mm"_a, "speed_knots"_a, "course_deg"_a, "hdop"_a, "fix"_a, "satellites"_a)
+      .def("put_battery", &Flight::putBattery, "sampled_us"_a, "voltage_v"_a, "current_a"_a)
+      .def("put_esc_status", &Flight::putEscStatus, "sampled_us"_a, "revolutions_per_s"_a,
+           "voltage_v"_a, "temperature_degc"_a, "current_a"_a, "Of M1..M4; NaN where not told")
       .def("loop", &Flight::loop, "now_us"_a, "One pass; returns the ESC commands M1..M4 after it")
       .def("close", &Flight::close,
            "Writes the rest of the log; true when all of it is on the disk")

@@ -28,6 +28,9 @@ nb::dict toDict(const strix::BrysonWeights& b) {
   d["thrust"] = b.thrust;
   d["torque"] = b.torque;
   d["yaw_torque"] = b.yawTorque;
+  d["integral_horizontal"] = b.integralHorizontal;
+  d["integral_vertical"] = b.integralVertical;
+  d["integral_yaw"] = b.integralYaw;
   return d;
 }
 
@@ -59,7 +62,10 @@ nb::dict toDict(const strix::Vehicle& v) {
   d["command_max"] = v.commandMax;
   d["command_flight_max"] = v.commandFlightMax;
   d["speed_flight_min"] = v.speedFlightMin;
+  d["curve_voltage"] = v.curveVoltage;
+  d["battery_cells"] = static_cast<int>(v.batteryCells);
   d["bryson"] = toDict(v.bryson);
+  d["bryson_no_lag"] = toDict(v.brysonNoLag);
   return d;
 }
 
