@@ -31,6 +31,15 @@ namespace strix {
           raw.speedKnots, raw.courseDeg, raw.hdop,     raw.fix,       raw.satellites};
 }
 
+[[nodiscard]] inline topic::BatteryStatus toRecord(LogTime time, LogTime sampled,
+                                                   const BatteryRaw& raw) {
+  return {time, sampled, raw.voltage, raw.current};
+}
+
+[[nodiscard]] inline topic::EscStatus toRecord(LogTime time, LogTime sampled, const EscRaw& raw) {
+  return {time, sampled, raw.revolutions, raw.voltage, raw.temperature, raw.current};
+}
+
 [[nodiscard]] inline topic::ManualControlSwitches toRecord(LogTime time,
                                                            const PilotSwitches& pilot) {
   return {time, switchPosition(pilot.arm), switchPosition(pilot.kill), switchPosition(pilot.start)};
@@ -45,12 +54,24 @@ namespace strix {
           declination,
           mission.takeoffHeight,
           mission.takeoffHoldTime,
+          mission.standAngle,
           mission.legCount,
+          static_cast<std::uint8_t>(mission.end),
           static_cast<std::uint8_t>(answered)};
 }
 
 [[nodiscard]] inline topic::MissionLeg toRecord(LogTime time, const Leg& leg) {
-  return {time, leg.north, leg.east, leg.height, leg.turn, leg.holdTime};
+  return {time,
+          leg.north,
+          leg.east,
+          leg.height,
+          leg.turn,
+          leg.radius,
+          leg.speed,
+          leg.roll,
+          leg.pitch,
+          leg.holdTime,
+          static_cast<std::uint8_t>(leg.kind)};
 }
 
 [[nodiscard]] inline topic::EstimatorAidSource toRecord(LogTime time,

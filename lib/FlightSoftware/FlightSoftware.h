@@ -1,6 +1,7 @@
 /// The flight software: everything that runs on the aircraft, for any Board.
 #pragma once
 
+#include "BatteryMonitor.h"
 #include "Board.h"
 #include "Conditions.h"
 #include "Controller.h"
@@ -27,6 +28,7 @@ class FlightSoftware {
         sensors_(board, config.sensors),
         startCalibration_(config.startCalibration),
         navigation_(config.navigation),
+        battery_(config.vehicle.batteryCells),
         guidance_(config.mission, config.guidance),
         controller_(config.vehicle, config.gains, config.control),
         motors_(config.vehicle),
@@ -146,6 +148,7 @@ class FlightSoftware {
   void controlTick(Micros now, LogTime time) {
     VehicleState estimate = navigation_.state();
     estimate.rateBody = controlRate_;
+    readPower(time);
     updateStateMachine(now, time, estimate);
     const Reference& reference = guidance_.update(now);
     controller_.updateControl(now, reference, estimate);
@@ -158,6 +161,20 @@ class FlightSoftware {
     logger_.logGNC(toRecords(time, estimate, reference, controller_, motors_, lastTick_));
     logNavigation(now, time);
     if (faultLog_.run(now)) logFaults(now, time);
+  }
+
+  /// Battery and ESCs, where they answer.
+  void readPower(LogTime time) {
+    BatteryRaw battery;
+    if (board_.readBattery(battery)) {
+      battery_.add(battery);
+      logger_.log(toRecord(time, clock_.at(battery.sampled), battery));
+    }
+    EscRaw escs;
+    if (board_.readEscStatus(escs)) {
+      battery_.add(escs);
+      logger_.log(toRecord(time, clock_.at(escs.sampled), escs));
+    }
   }
 
   [[nodiscard]] bool calibrating() const { return fsm_.state() == FlightState::Boot; }
@@ -343,6 +360,7 @@ class FlightSoftware {
   StartCalibration startCalibration_;
   OriginAverage origin_;
   Navigation<States> navigation_;
+  BatteryMonitor battery_;
   FiniteStateMachine fsm_;
   Guidance guidance_;
   Controller controller_;

@@ -66,9 +66,11 @@ using LogStreams = std::tuple<
     LogStream<topic::SensorMag,              0,     100,         1,      2000>,
     LogStream<topic::SensorBaro,             0,      50,         1,      2000>,
     LogStream<topic::VehicleGpsPosition,     0,      10,         1,      2000>,
+    LogStream<topic::BatteryStatus,          0,      10,         1,      2000>,
+    LogStream<topic::EscStatus,              0,       5,         1,      2000>,
     LogStream<topic::ManualControlSwitches,  0,       1,         1,     16000>,  // and on change
     LogStream<topic::FlightConfig,           0,       1,         1,      8000>,  // once
-    LogStream<topic::MissionLeg,             0,       1,         1,     16000>,  // 16 at most, once
+    LogStream<topic::MissionLeg,             0,       1,         1,     32000>,  // 32 at most, once
     LogStream<topic::VehicleAttitude,        0,     500,         1,      2000>,
     LogStream<topic::VehicleAngularVelocity, 0,     500,         1,      2000>,
     LogStream<topic::VehicleLocalPosition,   0,     500,         5,      2000>,
@@ -84,6 +86,7 @@ using LogStreams = std::tuple<
     LogStream<topic::VehicleAttitudeSetpoint,0,     500,         5,      2000>,
     LogStream<topic::WrenchSetpoint,         0,     500,         1,      2000>,
     LogStream<topic::WrenchAchieved,         0,     500,         1,      2000>,
+    LogStream<topic::ControllerStatus,       0,      50,         1,      2000>,
     LogStream<topic::ActuatorOutputs,        0,     500,         1,      2000>,
     LogStream<topic::FlightState,            0,      10,         1,      4000>,  // and on change
     LogStream<topic::ControlTick,            0,     500,         1,      2000>,

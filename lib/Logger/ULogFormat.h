@@ -74,8 +74,8 @@ class Message {
 }
 
 /// An info's key and value are cut at these lengths; kMaxInfo is the longest message then.
-constexpr std::size_t kMaxInfoKey = 16;
-constexpr std::size_t kMaxInfoValue = 64;
+constexpr std::size_t kMaxInfoKey = 12;
+constexpr std::size_t kMaxInfoValue = 40;  // a git commit
 constexpr std::size_t kMaxInfo = kMessageHeader + 1 + 9 + kMaxInfoKey + kMaxInfoValue;
 
 /// 'I': a text about the whole log. Its key carries the value's type: "char[5] sys_name".

@@ -7,6 +7,7 @@ void runGeodesyTests();
 void runStartCalibrationTests();
 void runNmeaTests();
 void runNmeaFixTests();
+void runBatteryTests();
 void runBiquadTests();
 void runIcm20649Tests();
 void runIcm20649FaultTests();

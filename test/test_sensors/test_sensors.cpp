@@ -11,6 +11,7 @@ int main() {
   runProcessingTests();
   runGeodesyTests();
   runStartCalibrationTests();
+  runBatteryTests();
   runBiquadTests();
   runNmeaTests();
   runNmeaFixTests();

@@ -29,10 +29,10 @@ struct ReplayResult {
 
 using FlightLogReader =
     LogReader<topic::SensorCombined, topic::SensorMag, topic::SensorBaro, topic::VehicleGpsPosition,
-              topic::ManualControlSwitches, topic::FlightConfig, topic::MissionLeg,
-              topic::ControlTick, topic::LogStatus, topic::VehicleAttitude,
-              topic::VehicleAngularVelocity, topic::WrenchSetpoint, topic::WrenchAchieved,
-              topic::ActuatorOutputs>;
+              topic::BatteryStatus, topic::EscStatus, topic::ManualControlSwitches,
+              topic::FlightConfig, topic::MissionLeg, topic::ControlTick, topic::LogStatus,
+              topic::VehicleAttitude, topic::VehicleAngularVelocity, topic::WrenchSetpoint,
+              topic::WrenchAchieved, topic::ActuatorOutputs>;
 
 /// The next record of a topic that has not been reached yet.
 template <class Topic>
@@ -80,6 +80,13 @@ class Cursor {
           r.fix_type,
           r.satellites_used};
 }
+[[nodiscard]] inline BatteryRaw asRead(const topic::BatteryStatus& r) {
+  return {static_cast<Micros>(r.timestamp_sample), r.voltage_v, r.current_a};
+}
+[[nodiscard]] inline EscRaw asRead(const topic::EscStatus& r) {
+  return {static_cast<Micros>(r.timestamp_sample), r.revolutions, r.voltage, r.temperature,
+          r.current};
+}
 [[nodiscard]] inline PilotSwitches asRead(const topic::ManualControlSwitches& r) {
   return {r.arm_switch == 1, r.kill_switch == 1, r.start_switch == 1};
 }
@@ -96,14 +103,19 @@ class Cursor {
 
 [[nodiscard]] inline Mission loggedMission(const FlightLogReader& log) {
   const topic::FlightConfig& chosen = loggedConfig(log);
-  Mission mission{"replayed", chosen.takeoff_height, chosen.takeoff_hold, chosen.leg_count, {}};
+  Mission mission{"replayed", chosen.takeoff_height, chosen.takeoff_hold, chosen.leg_count};
+  mission.end = static_cast<MissionEnd>(chosen.mission_end);
+  mission.standAngle = chosen.stand_angle;
   const auto& legs = log.records<topic::MissionLeg>();
   if (legs.size() < mission.legCount || mission.legCount > Mission::kMaxLegs) {
     log.refuse(std::to_string(mission.legCount) + " legs of the mission",
                std::to_string(legs.size()));
   }
   for (std::size_t i = 0; i < mission.legCount; ++i) {
-    mission.legs[i] = {legs[i].north, legs[i].east, legs[i].height, legs[i].turn, legs[i].hold};
+    const topic::MissionLeg& leg = legs[i];
+    mission.legs[i] = {
+        leg.north,  leg.east,  leg.height, leg.turn, leg.hold, static_cast<LegKind>(leg.kind),
+        leg.radius, leg.speed, leg.roll,   leg.pitch};
   }
   return mission;
 }
@@ -210,6 +222,8 @@ class Replay {
       if (lost(logStreamId<topic::SensorCombined, 0>()) ||
           lost(logStreamId<topic::SensorMag, 0>()) || lost(logStreamId<topic::SensorBaro, 0>()) ||
           lost(logStreamId<topic::VehicleGpsPosition, 0>()) ||
+          lost(logStreamId<topic::BatteryStatus, 0>()) ||
+          lost(logStreamId<topic::EscStatus, 0>()) ||
           lost(logStreamId<topic::ManualControlSwitches, 0>()) ||
           lost(logStreamId<topic::ControlTick, 0>())) {
         return sound;
@@ -226,6 +240,8 @@ class Replay {
     if (const auto* r = mag_.take(time)) board_.put(asRead(*r));
     if (const auto* r = alt_.take(time)) board_.put(asRead(*r));
     if (const auto* r = gps_.take(time)) board_.put(asRead(*r));
+    if (const auto* r = battery_.take(time)) board_.put(asRead(*r));
+    if (const auto* r = escs_.take(time)) board_.put(asRead(*r));
     while (switches_.time() <= time) board_.setPilot(asRead(*switches_.take(switches_.time())));
   }
 
@@ -258,6 +274,8 @@ class Replay {
   Cursor<topic::SensorMag> mag_{log_};
   Cursor<topic::SensorBaro> alt_{log_};
   Cursor<topic::VehicleGpsPosition> gps_{log_};
+  Cursor<topic::BatteryStatus> battery_{log_};
+  Cursor<topic::EscStatus> escs_{log_};
   Cursor<topic::ManualControlSwitches> switches_{log_};
   Cursor<topic::ControlTick> tick_{log_};
 };
