@@ -72,6 +72,7 @@ accuracy: ## Score the filter on the recordings in ../shared/data, beside VQF
 figures: ## Draw what each option of the navigation buys, into docs/figures
 	$(SETUP)
 	@$(VENV)/strix options --out docs/figures
+	@$(VENV)/strix gains --check --figures docs/figures
 
 firmware: ## Build the firmware for the Teensy 4.1 (needs PlatformIO's registry)
 	$(ENVIRONMENT)

@@ -9,7 +9,7 @@
 namespace strix {
 
 /// The airframe src/main.cpp flies.
-constexpr Airframe kFlown{kQuad5in, kQuad5inGains};
+constexpr Airframe kFlown{kQuad5in, kQuad5inGains, kQuad5inDesigns};
 
 /// Magnetic declination where you fly, east positive: look it up for your field.
 constexpr float kDeclination = 4.0F * kDegToRad;

@@ -12,7 +12,8 @@
 
 #include "board/TeensyBoard.h"
 
-// The board's ESCs are driven by pulse width; an airframe with other ESCs needs another EscPwm.
+// The board's ESCs are driven by pulse width; for ESCs on I2C the board needs EscI2c in place of
+// EscPwm: docs/board.md.
 static_assert(std::string_view(strix::kFlown.vehicle.commandUnit) == "us");
 
 // The flight software expects the sensors at the rates that the adapters set.

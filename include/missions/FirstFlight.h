@@ -1,21 +1,17 @@
 /// The first flight: up to 2 m, 5 m north and 3 m east, a quarter turn, back, down.
 #pragma once
 
-#include "Mission.h"
+#include "MissionText.h"
 
 namespace strix {
 
-constexpr Mission kFirstFlight{
-    "first-flight",
-    2.0F,       // m
-    2'000'000,  // us at take-off height
-    3,
-    {{
-        // north m, east m, height m, turn rad, hold us
-        {5.0F, 3.0F, 2.0F, 0.0F, 2'000'000},
-        {5.0F, 3.0F, 2.0F, kHalfPi, 2'000'000},
-        {0.0F, 0.0F, 2.0F, kHalfPi, 2'000'000},
-    }},
-};
+constexpr const char* kFirstFlightText =
+    "takeoff 2 2\n"
+    "leg 5 3 2  0 2  # north m, east m, height m, turn deg, hold s\n"
+    "leg 5 3 2 90 2\n"
+    "leg 0 0 2 90 2\n";
+
+constexpr Mission kFirstFlight = parseMission("first-flight", kFirstFlightText).mission;
+static_assert(parseMission("first-flight", kFirstFlightText).valid());
 
 }  // namespace strix

@@ -28,39 +28,40 @@ constexpr Vehicle kUgglanQ450{
     220.0F,    // ours: 10 % above the 200 rad/s at which the motor stops
     11.4F,     // ours: V, 3.8 a cell, half full
     3,
-    // ours: as for Quad5in, and slower, because the motors lag twice as long.
+    // ours: as for Quad5in, and slower, because the motors lag twice as long: roll and pitch rise
+    // in 0.33 s. The yaw step asks for 0.07 of 0.13 N m.
     {
         2.5F,   // m, position, horizontal
-        1.0F,   // m, position, vertical
-        1.6F,   // m/s, velocity, horizontal
+        0.7F,   // m, position, vertical
+        1.5F,   // m/s, velocity, horizontal
         1.0F,   // m/s, velocity, vertical
-        0.5F,   // rad, tilt
-        0.3F,   // rad, yaw
-        0.2F,   // rad/s, roll and pitch rate
-        0.4F,   // rad/s, yaw rate
+        0.3F,   // rad, tilt
+        0.25F,  // rad, yaw
+        0.8F,   // rad/s, roll and pitch rate
+        0.7F,   // rad/s, yaw rate
         2.0F,   // N, thrust
-        0.01F,  // N m, roll and pitch torque
-        0.05F,  // N m, yaw torque
-        3.0F,   // m s, integral of position, horizontal
-        3.0F,   // m s, integral of position, vertical
-        1.0F,   // rad s, integral of yaw
+        0.13F,  // N m, roll and pitch torque
+        0.03F,  // N m, yaw torque
+        2.5F,   // m s, integral of position, horizontal
+        0.7F,   // m s, integral of position, vertical
+        1.5F,   // rad s, integral of yaw
     },
-    // ours: for designs that do not know the lag.
+    // ours: for the designs that do not know the lag; the rate loop at 5 rad/s, the motors at 12.5.
     {
-        2.5F,   // m, position, horizontal
-        1.0F,   // m, position, vertical
-        1.6F,   // m/s, velocity, horizontal
-        1.0F,   // m/s, velocity, vertical
-        0.5F,   // rad, tilt
-        0.3F,   // rad, yaw
-        0.2F,   // rad/s, roll and pitch rate
-        0.4F,   // rad/s, yaw rate
-        2.0F,   // N, thrust
-        0.01F,  // N m, roll and pitch torque
-        0.05F,  // N m, yaw torque
-        3.0F,   // m s, integral of position, horizontal
-        3.0F,   // m s, integral of position, vertical
-        1.0F,   // rad s, integral of yaw
+        2.5F,    // m, position, horizontal
+        1.0F,    // m, position, vertical
+        1.6F,    // m/s, velocity, horizontal
+        1.0F,    // m/s, velocity, vertical
+        0.5F,    // rad, tilt
+        0.3F,    // rad, yaw
+        0.2F,    // rad/s, roll and pitch rate
+        0.4F,    // rad/s, yaw rate
+        2.0F,    // N, thrust
+        0.008F,  // N m, roll and pitch torque
+        0.05F,   // N m, yaw torque
+        5.0F,    // m s, integral of position, horizontal
+        2.0F,    // m s, integral of position, vertical
+        0.7F,    // rad s, integral of yaw
     },
 };
 

@@ -8,6 +8,7 @@
 #include "Vehicle.h"
 #include "gains/Quad5in.h"
 #include "gains/UgglanQ450.h"
+#include "gains/UgglanQ450Observer.h"
 #include "vehicles/Quad5in.h"
 #include "vehicles/UgglanQ450.h"
 
@@ -15,12 +16,14 @@ namespace strix {
 
 struct Airframe {
   const Vehicle& vehicle;
-  const Gains& gains;
+  const Gains& gains;                          ///< that fly: integral action, motor lag known
+  const std::array<const Gains*, 4>& designs;  ///< those, no integral, no lag, neither
+  const ObserverGains* observer = nullptr;     ///< of Ugglan's attitude law
 };
 
 constexpr std::array<Airframe, 2> kAirframes{{
-    {kQuad5in, kQuad5inGains},
-    {kUgglanQ450, kUgglanQ450Gains},
+    {kQuad5in, kQuad5inGains, kQuad5inDesigns},
+    {kUgglanQ450, kUgglanQ450Gains, kUgglanQ450Designs, &kUgglanQ450ObserverGains},
 }};
 
 /// @return nullptr when there is none of that name

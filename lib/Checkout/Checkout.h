@@ -6,6 +6,7 @@
 #include "Board.h"
 #include "CheckoutConfig.h"
 #include "CommandLine.h"
+#include "EscCalibration.h"
 #include "FlightSoftwareConfig.h"
 #include "MotionWatch.h"
 #include "MotorTest.h"
@@ -16,7 +17,8 @@
 namespace strix {
 
 /// Runs instead of FlightSoftware, never beside it: PowerUpChoice. Motors are off in each step but
-/// those of a motor test (MotorTest). Nothing blocks; nothing is measured but what a step sees.
+/// those of a motor test (MotorTest) and of teaching the ESCs (EscCalibration). Nothing blocks;
+/// nothing is measured but what a step sees.
 template <class Board>
 class Checkout {
  public:
@@ -27,6 +29,7 @@ class Checkout {
         sensors_(board, config.sensors),
         motion_(config.startCalibration),
         motorTest_(config.vehicle),
+        teaching_(config.vehicle),
         axes_(out_),
         table_(out_, pins, rates, limitsOf(config)),
         record_(config.sensors.accelRange, config.sensors.gyroRange, config.sensors.magRange),
@@ -54,8 +57,8 @@ class Checkout {
       if (character < 0) break;
       take(now, static_cast<char>(character));
     }
-    runMotorTest(now);
-    board_.writeEsc(motorTest_.commands());
+    runMotors(now);
+    board_.writeEsc(teaching_.active() ? teaching_.commands() : motorTest_.commands());
     if (activity_ == Activity::Measure) measure(now);
     if (activity_ == Activity::Watch && elapsed(now, since_) >= kWatchPeriod) {
       since_ = now;
@@ -70,6 +73,7 @@ class Checkout {
  private:
   static constexpr int kCharactersAStep = 16;
   static constexpr Micros kMeasureTime = 5'000'000;
+  static constexpr Micros kOneEnter = 50'000;  ///< no hand presses two keys as fast
   static constexpr Micros kWatchPeriod = 500'000;
 
   enum class Activity { None, Measure, Watch, Axes };
@@ -113,11 +117,22 @@ class Checkout {
     }
   }
 
-  /// Any character stops a motor; then it counts as typed.
+  /// Any character stops a motor; then it counts as typed. Only the line feed that a terminal sends
+  /// with its return belongs to the command before it.
   void take(Micros now, char c) {
+    const bool sameEnter = c == '\n' && elapsed(now, returned_) < kOneEnter && line_.returned();
+    if (c == '\r') returned_ = now;
+    if (sameEnter) {
+      (void)line_.take(c);
+      return;
+    }
     if (motorTest_.active()) {
       motorTest_.stop();
       out_ << "\nstopped\n";
+      prompt();
+    }
+    if (teaching_.active()) {
+      out_ << "\n" << teaching_.stop() << "\n";
       prompt();
     }
     switch (line_.take(c)) {
@@ -160,6 +175,8 @@ class Checkout {
     if (line == "pilot") return watch(now, Shown::Pilot);
     if (line == "props off") return promise(now);
     if (line.size() == 7 && line.substr(0, 6) == "motor ") return startMotor(now, line[6]);
+    if (line == "battery off") return promiseBattery(now);
+    if (line == "teach escs") return startTeaching(now);
     if (line == "stop") {
       out_ << "all motors are off\n";
       return;
@@ -179,12 +196,14 @@ class Checkout {
             "                   what it reads, twice a second until Enter\n"
             "  props off        you have taken the propellers off; counts for 60 s\n"
             "  motor 1 .. 4     turns that motor slowly for 2 s; any key stops it\n"
+            "  battery off      the ESCs have no power; counts for 60 s\n"
+            "  teach escs       full, then off at any key: ESCs take them for their range\n"
             "  stop             ends whatever runs\n"
             "  reboot           starts again\n";
   }
 
   void prompt() {
-    if (activity_ == Activity::None && !motorTest_.active()) out_ << "> ";
+    if (activity_ == Activity::None && !motorTest_.active() && !teaching_.active()) out_ << "> ";
   }
 
   void endActivity() {
@@ -290,7 +309,13 @@ class Checkout {
 
   void promise(Micros now) {
     motorTest_.promise(now);
+    teaching_.promisePropellersOff(now);
     out_ << "noted: propellers off, for 60 s\n";
+  }
+
+  void promiseBattery(Micros now) {
+    teaching_.promiseBatteryOff(now);
+    out_ << "noted: battery off, for 60 s\n";
   }
 
   [[nodiscard]] MotorTestInputs motorTestInputs() const {
@@ -309,11 +334,23 @@ class Checkout {
          << " seen from above; any key stops it\n";
   }
 
-  void runMotorTest(Micros now) {
-    const char* happened = motorTest_.update(now, motorTestInputs());
-    if (happened == nullptr) return;
-    out_ << happened << "\n";
-    prompt();
+  void startTeaching(Micros now) {
+    if (const char* reason = teaching_.start(now, motorTestInputs())) {
+      out_ << "refused: " << reason << "\n";
+      return;
+    }
+    out_ << "full in 3 s, for 30 s; any key ends it\n";
+  }
+
+  /// At most one of them is active: each starts by a command, and any character ends it.
+  void runMotors(Micros now) {
+    const char* turned = motorTest_.update(now, motorTestInputs());
+    const char* taught = teaching_.update(now, motorTestInputs());
+    for (const char* happened : {turned, taught}) {
+      if (happened == nullptr) continue;
+      out_ << happened << "\n";
+      prompt();
+    }
   }
 
   Board& board_;
@@ -323,6 +360,7 @@ class Checkout {
   CommandLine line_;
   MotionWatch motion_;
   MotorTest motorTest_;
+  EscCalibration teaching_;
   AxisCheck axes_;
   SensorTable table_;
   SensorRecord record_;
@@ -337,6 +375,7 @@ class Checkout {
   bool fresh_ = false;
   Micros since_ = 0;  ///< of the activity
   Micros lastSample_ = 0;
+  Micros returned_ = 0;  ///< when a return came last
   unsigned turn_ = 0;
   bool rebootAsked_ = false;
 };

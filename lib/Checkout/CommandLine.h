@@ -44,6 +44,9 @@ class CommandLine {
     return Event::Typed;
   }
 
+  /// The last character was a return: a line feed would be the same Enter.
+  [[nodiscard]] bool returned() const { return lastWasReturn_; }
+
   /// The line without blanks at its ends.
   [[nodiscard]] std::string_view text() const {
     std::string_view text(characters_.data(), size_);

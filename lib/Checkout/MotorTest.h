@@ -24,10 +24,10 @@ struct MotorTestInputs {
   bool turning = true;
 };
 
-/// The only part of the checkout that can command more than off. A test is a countdown of 3 s and a
-/// run of at most 2 s at idle and 3 % of the flight range; anything amiss ends it, in the step that
-/// sees it. A motor vibrates, so standing still is asked for up to its start, and not tilting or
-/// turning to its end.
+/// With EscCalibration the only part of the checkout that can command more than off. A test is a
+/// countdown of 3 s and a run of at most 2 s at idle and 3 % of the flight range; anything amiss
+/// ends it, in the step that sees it. A motor vibrates, so standing still is asked for up to its
+/// start, and not tilting or turning to its end.
 class MotorTest {
  public:
   static constexpr Micros kPromise = 60'000'000;  ///< how long `props off` is believed

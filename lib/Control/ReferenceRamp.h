@@ -1,4 +1,5 @@
-/// Guidance: brings position and yaw to a target, smoothly and in a straight line.
+/// Guidance: brings position and yaw to a target in a straight line at constant speed: take-off and
+/// landing.
 #pragma once
 
 #include "Mathpk.h"
@@ -38,7 +39,10 @@ class TrapezoidalRamp {
     const float half = 0.5F * acceleration * dt;
     const float square = half * half + acceleration * (2.0F * remaining_ - speed_ * dt);
     float next = square > half * half ? squareRoot(square) - half : 0.0F;
-    if (next > speedMax) next = speedMax;
+    if (next > speedMax) {  // a limit lowered on the way is met by braking
+      const float braked = speed_ - 2.0F * half;
+      next = braked > speedMax ? braked : speedMax;
+    }
     if (next > speed_ + 2.0F * half) next = speed_ + 2.0F * half;
     const float moved = 0.5F * (speed_ + next) * dt;
     remaining_ = next > 0.0F && moved < remaining_ ? remaining_ - moved : 0.0F;
@@ -66,11 +70,16 @@ class ReferenceRamp {
 
   /// Starts at rest where the aircraft is, with that as its target.
   void reset(Micros now, const VehicleState& state) {
+    reset(now, state.positionNed, yawOf(state.attitude));
+  }
+
+  /// Starts at rest at this place and heading, rad in (-pi, pi], with that as its target.
+  void reset(Micros now, const Vector3f& positionNed, float yaw) {
     last_ = now;
     position_.start(0.0F);
     yaw_.start(0.0F);
-    targetPosition_ = legEnd_ = state.positionNed;
-    targetYaw_ = yawEnd_ = yawOf(state.attitude);
+    targetPosition_ = legEnd_ = positionNed;
+    targetYaw_ = yawEnd_ = yaw;
     reference_ = {legEnd_, Vector3f::Zero(), yawEnd_, 0.0F, Vector3f::Zero()};
   }
 
@@ -90,6 +99,12 @@ class ReferenceRamp {
       yaw_.brake(limits_.yawAcceleration);
       yawEnd_ = wrapAngle(reference_.yaw + turn_ * yaw_.remaining());
     }
+  }
+
+  /// From now on, also on the way. @param speed  m/s
+  void setVerticalSpeed(float speed) {
+    limits_.speedVertical = speed;
+    legSpeed_ = speedAlong(direction_);
   }
 
   /// The reference at `now`. It moves in steps of 2 ms or more, in which the way is long enough to
@@ -131,13 +146,18 @@ class ReferenceRamp {
     if (!(distance > 0.0F)) return;  // the square of a tiny way underflows
     direction_ = way / distance;
     position_.start(distance);
-    // The speed along the leg whose horizontal and vertical parts both keep their limits.
+    legSpeed_ = speedAlong(direction_);
+  }
+
+  /// The speed whose horizontal and vertical parts both keep their limits.
+  [[nodiscard]] float speedAlong(const Vector3f& direction) const {
     const float horizontal =
-        squareRoot(direction_.x() * direction_.x() + direction_.y() * direction_.y());
-    const float vertical = direction_.z() < 0.0F ? -direction_.z() : direction_.z();
-    legSpeed_ = limits_.speedHorizontal * vertical < limits_.speedVertical * horizontal
-                    ? limits_.speedHorizontal / horizontal
-                    : limits_.speedVertical / vertical;
+        squareRoot(direction.x() * direction.x() + direction.y() * direction.y());
+    const float vertical = direction.z() < 0.0F ? -direction.z() : direction.z();
+    if (!(horizontal + vertical > 0.0F)) return 0.0F;  // no leg yet
+    return limits_.speedHorizontal * vertical < limits_.speedVertical * horizontal
+               ? limits_.speedHorizontal / horizontal
+               : limits_.speedVertical / vertical;
   }
 
   void startTurn() {

@@ -27,15 +27,19 @@ constexpr ConditionSet kUpset = 1U << 11U;               ///< tilt past 90 deg
 constexpr ConditionSet kOutsideFence = 1U << 12U;        ///< too far or too high
 constexpr ConditionSet kImuLost = 1U << 13U;             ///< no IMU sample in time
 constexpr ConditionSet kEstimatorUnhealthy = 1U << 14U;  ///< state or covariance not usable
-constexpr std::size_t kCount = 15;
+constexpr ConditionSet kStandMission = 1U << 15U;        ///< the mission is the attitude stand's
+constexpr ConditionSet kStandDone = 1U << 16U;           ///< its sequence has come to its end
+constexpr ConditionSet kReturn = 1U << 17U;              ///< fly home
+constexpr std::size_t kCount = 18;
 }  // namespace condition
 
 constexpr std::array<const char*, condition::kCount> kConditionNames{
-    "Calibrated",   "ArmEdge", "Disarm",       "PreArmFailure", "Start",
-    "ArmedTooLong", "Arrived", "HoldDone",     "LegsRemain",    "TouchDown",
-    "Kill",         "Upset",   "OutsideFence", "ImuLost",       "EstimatorUnhealthy"};
+    "Calibrated",   "ArmEdge",   "Disarm",       "PreArmFailure", "Start",
+    "ArmedTooLong", "Arrived",   "HoldDone",     "LegsRemain",    "TouchDown",
+    "Kill",         "Upset",     "OutsideFence", "ImuLost",       "EstimatorUnhealthy",
+    "StandMission", "StandDone", "Return"};
 
-/// Conditions that end a flight at once.
+/// Conditions that end a flight at once; on the attitude stand the fence does not count.
 constexpr ConditionSet kCritical = condition::kKill | condition::kUpset | condition::kOutsideFence |
                                    condition::kImuLost | condition::kEstimatorUnhealthy;
 

@@ -7,9 +7,21 @@
 
 namespace strix {
 
-enum class FlightState : std::uint8_t { Boot, Idle, Armed, Takeoff, Hold, Waypoint, Land, Safe };
+/// The log holds these numbers: new states go to the end.
+enum class FlightState : std::uint8_t {
+  Boot,
+  Idle,
+  Armed,
+  Takeoff,
+  Hold,
+  Waypoint,
+  Land,
+  Safe,
+  AttitudeStand,  ///< fixed to a gimbal, turning through a sequence of attitudes
+  Return,         ///< on the way home
+};
 
-constexpr std::size_t kStateCount = 8;
+constexpr std::size_t kStateCount = 10;
 
 struct StateProperties {
   FlightState state;
@@ -27,6 +39,8 @@ constexpr std::array<StateProperties, kStateCount> kStates{{
     {FlightState::Waypoint, "WAYPOINT", true, true},
     {FlightState::Land, "LAND", true, true},
     {FlightState::Safe, "SAFE", false, false},
+    {FlightState::AttitudeStand, "ATTITUDE_STAND", true, true},
+    {FlightState::Return, "RETURN", true, true},
 }};
 
 [[nodiscard]] constexpr const StateProperties& propertiesOf(FlightState state) {
@@ -41,8 +55,8 @@ template <class... States>
   return static_cast<StateSet>(((1U << static_cast<unsigned>(states)) | ...));
 }
 
-constexpr StateSet kFlying =
-    in(FlightState::Takeoff, FlightState::Hold, FlightState::Waypoint, FlightState::Land);
-constexpr StateSet kMotorsOn = kFlying | in(FlightState::Armed);
+constexpr StateSet kFlying = in(FlightState::Takeoff, FlightState::Hold, FlightState::Waypoint,
+                                FlightState::Land, FlightState::Return);
+constexpr StateSet kMotorsOn = kFlying | in(FlightState::Armed, FlightState::AttitudeStand);
 
 }  // namespace strix

@@ -5,6 +5,7 @@
 #include "Board.h"
 #include "Controller.h"
 #include "DataTypes.h"
+#include "FlightSoftwareConfig.h"
 #include "Mission.h"
 #include "Motors.h"
 #include "Navigation.h"
@@ -45,18 +46,22 @@ namespace strix {
   return {time, switchPosition(pilot.arm), switchPosition(pilot.kill), switchPosition(pilot.start)};
 }
 
-[[nodiscard]] inline topic::FlightConfig toRecord(LogTime time, const Mission& mission,
-                                                  float declination, const SensorSet& found) {
+[[nodiscard]] inline topic::FlightConfig toRecord(LogTime time, const FlightSoftwareConfig& config,
+                                                  const SensorSet& found) {
   const std::array<bool, 5> devices{found.imu, found.mag, found.alt, found.gps, found.card};
   unsigned answered = 0;
   for (std::size_t i = 0; i < devices.size(); ++i) answered |= devices[i] ? 1U << i : 0U;
+  const Mission& mission = config.mission;
+  const bool reducedObserver = config.control.reducedObserver != nullptr;
   return {time,
-          declination,
+          config.declination,
           mission.takeoffHeight,
           mission.takeoffHoldTime,
           mission.standAngle,
           mission.legCount,
           static_cast<std::uint8_t>(mission.end),
+          config.design,
+          static_cast<std::uint8_t>(reducedObserver ? 1 : 0),
           static_cast<std::uint8_t>(answered)};
 }
 
@@ -98,6 +103,16 @@ template <int States>
 [[nodiscard]] topic::EstimatorHealth toRecord(LogTime time, const Navigation<States>& navigation) {
   return {time, navigation.health(), navigation.restarts(), navigation.readmissions(),
           navigation.vibration()};
+}
+
+[[nodiscard]] inline topic::ControllerStatus toRecord(LogTime time, const Controller& controller,
+                                                      const Motors& motors) {
+  const IntegralAction& integral = controller.integral();
+  const Vector2f& horizontal = integral.horizontalNed();
+  return {time,
+          {horizontal.x(), horizontal.y(), integral.down(), integral.yaw()},
+          controller.wrenchEstimate().now(),
+          motors.supply()};
 }
 
 [[nodiscard]] inline GncRecords toRecords(LogTime time, const VehicleState& estimate,

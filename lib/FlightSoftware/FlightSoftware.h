@@ -29,9 +29,9 @@ class FlightSoftware {
         startCalibration_(config.startCalibration),
         navigation_(config.navigation),
         battery_(config.vehicle.batteryCells),
-        guidance_(config.mission, config.guidance),
+        guidance_(config.mission, config.guidance, config.vehicle.mass * kGravity),
         controller_(config.vehicle, config.gains, config.control),
-        motors_(config.vehicle),
+        motors_(config.vehicle, config.motors),
         gyroFilter_(config.gyroFilter, 1e6F / static_cast<float>(config.sensors.imuPeriod),
                     static_cast<float>(Controller::kRateHz), config.vehicle.motorTimeConstant),
         logger_(board.card()),
@@ -56,15 +56,15 @@ class FlightSoftware {
     touchDown_.reset(now);
     entered_ = now;
     Micros phase = 0;  // each in a control tick of its own
-    for (PeriodicTask* task :
-         {&stateLog_, &switchLog_, &stdLog_, &statusLog_, &faultLog_, &faultRecord_}) {
+    for (PeriodicTask* task : {&stateLog_, &switchLog_, &stdLog_, &statusLog_, &controlLog_,
+                               &faultLog_, &faultRecord_}) {
       phase += periodFromHz(Controller::kRateHz);
       task->start(now + phase);
     }
     logger_.begin(time,
                   {config_.vehicle.name, Board::kName, kVersion, kGitCommit, board_.bootId()});
     const Mission& mission = config_.mission;
-    logger_.log(toRecord(time, mission, config_.declination, found_));
+    logger_.log(toRecord(time, config_, found_));
     for (std::size_t i = 0; i < mission.legCount && i < Mission::kMaxLegs; ++i) {
       logger_.log(toRecord(time, mission.legs[i]));
     }
@@ -151,8 +151,10 @@ class FlightSoftware {
     readPower(time);
     updateStateMachine(now, time, estimate);
     const Reference& reference = guidance_.update(now);
+    const bool controlled = fsm_.getControlFlag() && !guidance_.idles();
+    controller_.setGrounded(!controlled);
     controller_.updateControl(now, reference, estimate);
-    motors_.commandControl(fsm_.getControlFlag() ? controller_.getControl() : Wrench::none());
+    motors_.commandControl(controlled ? controller_.getControl() : Wrench::none());
     motors_.writeESC(board_);
     controller_.setAchieved(motors_.achieved());
     navigation_.setMotors(motorState(now));
@@ -160,6 +162,7 @@ class FlightSoftware {
     lastTick_ = tick(now, time);
     logger_.logGNC(toRecords(time, estimate, reference, controller_, motors_, lastTick_));
     logNavigation(now, time);
+    if (controlLog_.run(now)) logger_.log(toRecord(time, controller_, motors_));
     if (faultLog_.run(now)) logFaults(now, time);
   }
 
@@ -175,6 +178,7 @@ class FlightSoftware {
       battery_.add(escs);
       logger_.log(toRecord(time, clock_.at(escs.sampled), escs));
     }
+    motors_.setBatteryVoltage(battery_.voltage());
   }
 
   [[nodiscard]] bool calibrating() const { return fsm_.state() == FlightState::Boot; }
@@ -241,15 +245,17 @@ class FlightSoftware {
     refuseIf(!found_.imu || !sensors_.imuFresh(now), prearm::kImu);
     refuseIf(!found_.mag || !sensors_.magFresh(now), prearm::kMag);
     refuseIf(!found_.alt || !sensors_.altFresh(now), prearm::kAlt);
-    refuseIf(!sensors_.gpsFresh(now) || !sensors_.gpsUsable(sensors_.getGPSMeas()), prearm::kGps);
-    refuseIf(origin_.count() < config_.originFixes, prearm::kOrigin);
+    if (!config_.mission.onStand()) {  // which has no place, and may be under a roof
+      refuseIf(!sensors_.gpsFresh(now) || !sensors_.gpsUsable(sensors_.getGPSMeas()), prearm::kGps);
+      refuseIf(origin_.count() < config_.originFixes, prearm::kOrigin);
+      refuseIf(!config_.fence.contains(estimate.positionNed), prearm::kFence);
+    }
     refuseIf((navigation_.health() & health::kNoArming) != 0, prearm::kEstimator);
     refuseIf(!(cosTilt(estimate.attitude) > cosArmTilt_), prearm::kTilt);
     refuseIf(!navigation_.standsStill(), prearm::kMoving);
     refuseIf(pilot.kill, prearm::kKillSwitch);
     refuseIf(pilot.start, prearm::kStartSwitch);
     refuseIf(!found_.card || logger_.failed(), prearm::kLog);
-    refuseIf(!config_.fence.contains(estimate.positionNed), prearm::kFence);
     return set;
   }
 
@@ -378,6 +384,7 @@ class FlightSoftware {
   PeriodicTask switchLog_{periodFromHz(1)};
   PeriodicTask stdLog_{periodFromHz(50)};
   PeriodicTask statusLog_{periodFromHz(10)};
+  PeriodicTask controlLog_{periodFromHz(50)};
   PeriodicTask faultLog_{periodFromHz(10)};
   PeriodicTask faultRecord_{periodFromHz(1)};
   SensorFaultWatch faults_;

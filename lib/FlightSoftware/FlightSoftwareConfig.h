@@ -5,6 +5,7 @@
 #include "Detectors.h"
 #include "Guidance.h"
 #include "GyroFilter.h"
+#include "Motors.h"
 #include "NavigationConfig.h"
 #include "Sensors.h"
 #include "StartCalibration.h"
@@ -21,10 +22,12 @@ struct FlightSoftwareConfig {
   NavigationConfig navigation{};
   GyroFilterConfig gyroFilter{};  ///< of the rates that the controller gets
   GuidanceConfig guidance{};
-  ControlLimits control{};
+  MotorConfig motors{};
+  ControlConfig control{};
   Fence fence{};
   TouchDownConfig touchDown{};
   HoverConfig hover{};
+  std::uint8_t design = 0;            ///< which of the airframe's designs `gains` is, for the log
   float declination = 0.0F;           ///< rad, east positive: magnetic to true north
   std::uint32_t originFixes = 50;     ///< GPS fixes averaged before arming is allowed
   float armTilt = 20.0F * kDegToRad;  ///< rad, most tilt at arming

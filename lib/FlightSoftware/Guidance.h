@@ -4,44 +4,72 @@
 #include "Conditions.h"
 #include "Mission.h"
 #include "ReferenceRamp.h"
+#include "StandSequence.h"
 #include "States.h"
+#include "Trajectory.h"
 
 namespace strix {
 
 struct GuidanceConfig {
+  /// Take-off and landing.
   RampLimits ramp{1.0F, 0.5F, 1.0F, 45.0F * kDegToRad, 90.0F * kDegToRad};
+  TrajectoryLimits trajectory{};         ///< from place to place
   float arrivalRadius = 0.5F;            ///< m
   float arrivalSpeed = 0.4F;             ///< m/s
   float arrivalYaw = 10.0F * kDegToRad;  ///< rad
   float landingDepth = 3.0F;             ///< m below the start the landing ramp aims at
+  float landingSlowHeight = 1.0F;        ///< m above the start: below it the landing is slower,
+  float landingSlowSpeed = 0.3F;         ///< m/s, as PX4's MPC_LAND_CRWL
+  float returnHeight = 3.0F;             ///< m, ours: above people and fences on the way home
+  float standThrust = 0.6F;  ///< of the weight, ours: near hover, and the stand holds it
 };
 
 class Guidance {
  public:
-  Guidance(const Mission& mission, const GuidanceConfig& config)
-      : mission_(mission), config_(config), ramp_(config.ramp) {}
+  /// @param weight  N, of which the stand's thrust is a share
+  Guidance(const Mission& mission, const GuidanceConfig& config, float weight = 0.0F)
+      : mission_(mission),
+        config_(config),
+        standThrust_(config.standThrust * weight),
+        ramp_(config.ramp),
+        trajectory_(config.trajectory) {}
 
   /// Called when the state machine has just entered `state`.
   void enter(FlightState state, Micros now, const VehicleState& estimate) {
+    state_ = state;
     entered_ = now;
+    idles_ = false;
     switch (state) {
       case FlightState::Takeoff:
+        source_ = Source::Ramp;
         leg_ = 0;
         holdTime_ = mission_.takeoffHoldTime;
+        radius_ = config_.arrivalRadius;
         startYaw_ = yawOf(estimate.attitude);
+        ramp_.setVerticalSpeed(config_.ramp.speedVertical);
         ramp_.reset(now, estimate);
-        setTarget({0.0F, 0.0F, -mission_.takeoffHeight}, startYaw_);
+        target_ = {0.0F, 0.0F, -mission_.takeoffHeight};
+        targetYaw_ = startYaw_;
+        ramp_.setTarget(target_, targetYaw_);
         break;
-      case FlightState::Waypoint: {
-        const Leg& leg = mission_.legs[leg_++];
-        holdTime_ = leg.holdTime;
-        setTarget({leg.north, leg.east, -leg.height}, startYaw_ + leg.turn);
+      case FlightState::Waypoint:
+        if (leg_ < mission_.legCount) startLeg(mission_.legs[leg_++], now, estimate);
         break;
-      }
+      case FlightState::Hold:
+        // From one attitude straight to the next; after the last one the aircraft is stopped.
+        if (source_ == Source::Attitude && !nextIsAttitude()) stop(now, estimate);
+        break;
+      case FlightState::Return:
+        startReturn(now, estimate);
+        break;
       case FlightState::Land:
-        // Below the ground, so that the descent goes on until touch-down whatever the altimeter
-        // says.
-        setTarget({target_.x(), target_.y(), config_.landingDepth}, targetYaw_);
+        stop(now, estimate);
+        if (trajectory_.arrived()) startDescent(now);
+        break;
+      case FlightState::AttitudeStand:
+        source_ = Source::Stand;
+        startYaw_ = yawOf(estimate.attitude);
+        part_ = stand::kSteps + 2;  // none
         break;
       default:
         break;
@@ -49,42 +77,219 @@ class Guidance {
   }
 
   /// The reference at `now`.
-  const Reference& update(Micros now) { return ramp_.update(now); }
+  const Reference& update(Micros now) {
+    switch (source_) {
+      case Source::Ramp:
+        if (state_ == FlightState::Land &&
+            -ramp_.reference().positionNed.z() < config_.landingSlowHeight) {
+          ramp_.setVerticalSpeed(config_.landingSlowSpeed);
+        }
+        return ramp_.update(now);
+      case Source::Trajectory:
+        trajectory_.update(now);
+        if (trajectory_.arrived()) goOn(now);
+        break;
+      case Source::Attitude:
+        updateAttitude(now);
+        break;
+      case Source::Stand:
+        if (state_ == FlightState::AttitudeStand) updateStand(now);
+        break;
+    }
+    return reference();
+  }
 
-  /// kArrived, kHoldDone and kLegsRemain as they are now.
+  /// kArrived, kHoldDone, kLegsRemain, kReturn, kStandMission and kStandDone as they are now.
   [[nodiscard]] ConditionSet conditions(Micros now, const VehicleState& estimate) const {
     ConditionSet set = condition::kNone;
-    if (ramp_.arrived() && near(estimate)) set |= condition::kArrived;
-    if (elapsed(now, entered_) >= holdTime_) set |= condition::kHoldDone;
-    if (leg_ < mission_.legCount) set |= condition::kLegsRemain;
+    const Micros waited = elapsed(now, entered_);
+    const bool legsRemain = leg_ < mission_.legCount;
+    const bool holdDone = waited >= holdTime_ && !(stopping_ && !trajectory_.arrived());
+    if (arrived(waited, estimate)) set |= condition::kArrived;
+    if (holdDone) set |= condition::kHoldDone;
+    if (legsRemain) set |= condition::kLegsRemain;
+    if (state_ == FlightState::Hold && holdDone && !legsRemain &&
+        mission_.end == MissionEnd::Home) {
+      set |= condition::kReturn;
+    }
+    if (mission_.onStand()) set |= condition::kStandMission;
+    if (state_ == FlightState::AttitudeStand && waited >= stand::kEnd) {
+      set |= condition::kStandDone;
+    }
     return set;
   }
 
-  [[nodiscard]] const Reference& reference() const { return ramp_.reference(); }
+  /// The motors shall idle although the state has the controller on: the stand's first seconds.
+  [[nodiscard]] bool idles() const { return idles_; }
+
+  [[nodiscard]] const Reference& reference() const {
+    if (source_ == Source::Ramp) return ramp_.reference();
+    return source_ == Source::Trajectory ? trajectory_.reference() : tilted_;
+  }
 
  private:
+  enum class Source : std::uint8_t { Ramp, Trajectory, Attitude, Stand };
+
   void setTarget(const Vector3f& positionNed, float yaw) {
     target_ = positionNed;
     targetYaw_ = wrapAngle(yaw);
+    trajectory_.setTarget(target_, targetYaw_);
+  }
+
+  /// Goes on by trajectory from the motion that is there: of the reference, or of the aircraft
+  /// where the reference had no place.
+  void takeOver(Micros now, const VehicleState& estimate) {
+    if (source_ != Source::Trajectory) {
+      Reference from = reference();
+      if (source_ == Source::Attitude) {
+        from.positionNed.head<2>() = estimate.positionNed.head<2>();
+        from.velocityNed.head<2>() = estimate.velocityNed.head<2>();
+        from.accelerationNed.head<2>().setZero();
+      }
+      trajectory_.reset(now, from);
+    }
+    source_ = Source::Trajectory;
+    stopping_ = false;
+    radius_ = config_.arrivalRadius;
+  }
+
+  /// Comes to rest and stays there.
+  void stop(Micros now, const VehicleState& estimate) {
+    takeOver(now, estimate);
+    if (!trajectory_.arrived()) trajectory_.halt();
+    target_ = trajectory_.target();
+    targetYaw_ = trajectory_.targetYaw();
+    stopping_ = true;
+  }
+
+  void startLeg(const Leg& leg, Micros now, const VehicleState& estimate) {
+    if (leg.kind == LegKind::Attitude) {
+      const float yaw = wrapAngle(reference().yaw + leg.turn);
+      if (source_ != Source::Attitude) takeOver(now, estimate);
+      source_ = Source::Attitude;
+      tilted_ = trajectory_.reference();
+      tilted_.mode = ReferenceMode::AttitudeHeight;
+      tilted_.attitude = eulerToQuaternion({leg.roll, leg.pitch, yaw});
+      tilted_.yaw = yaw;
+      tilted_.yawRate = 0.0F;
+      attitudeTime_ = leg.holdTime;
+      holdTime_ = 0;
+      return;
+    }
+    takeOver(now, estimate);
+    holdTime_ = leg.holdTime;
+    if (leg.radius > 0.0F) radius_ = leg.radius;
+    trajectory_.setSpeed(leg.speed);
+    setTarget({leg.north, leg.east, -leg.height}, startYaw_ + leg.turn);
+  }
+
+  /// First up, where that is needed, then over the start.
+  void startReturn(Micros now, const VehicleState& estimate) {
+    stop(now, estimate);
+    stopping_ = false;
+    trajectory_.setSpeed(0.0F);
+    climbing_ = -target_.z() < config_.returnHeight;
+    if (climbing_) {
+      setTarget({target_.x(), target_.y(), -config_.returnHeight}, targetYaw_);
+    } else {
+      setTarget({0.0F, 0.0F, target_.z()}, targetYaw_);
+    }
+  }
+
+  /// What follows when a trajectory has come to its end.
+  void goOn(Micros now) {
+    if (state_ == FlightState::Land) startDescent(now);
+    if (state_ == FlightState::Return && climbing_) {
+      climbing_ = false;
+      setTarget({0.0F, 0.0F, target_.z()}, targetYaw_);
+    }
+  }
+
+  /// Below the ground, so that the descent goes on until touch-down whatever the altimeter says.
+  void startDescent(Micros now) {
+    source_ = Source::Ramp;
+    ramp_.setVerticalSpeed(config_.ramp.speedVertical);
+    ramp_.reset(now, target_, targetYaw_);
+    target_.z() = config_.landingDepth;
     ramp_.setTarget(target_, targetYaw_);
+  }
+
+  /// At the height that the last trajectory gives.
+  void updateAttitude(Micros now) {
+    const Reference& level = trajectory_.update(now);
+    tilted_.positionNed = level.positionNed;
+    tilted_.velocityNed = level.velocityNed;
+    tilted_.accelerationNed = level.accelerationNed;
+  }
+
+  void updateStand(Micros now) {
+    const Micros part = stand::partAt(elapsed(now, entered_));
+    idles_ = part == 0;
+    if (part == part_) return;
+    part_ = part;
+    EulerAngles wanted = stand::attitudeIn(part, mission_.standAngle);
+    wanted.yaw = wrapAngle(startYaw_ + wanted.yaw);
+    tilted_ = {};
+    tilted_.mode = ReferenceMode::Attitude;
+    tilted_.attitude = eulerToQuaternion(wanted);
+    tilted_.yaw = wanted.yaw;
+    tilted_.thrust = idles_ ? 0.0F : standThrust_;
+  }
+
+  [[nodiscard]] bool nextIsAttitude() const {
+    return leg_ < mission_.legCount && mission_.legs[leg_].kind == LegKind::Attitude;
+  }
+
+  /// @param waited  us in this state
+  [[nodiscard]] bool arrived(Micros waited, const VehicleState& estimate) const {
+    switch (source_) {
+      case Source::Ramp:
+        return ramp_.arrived() && near(estimate);
+      case Source::Attitude:
+        return waited >= attitudeTime_;
+      case Source::Trajectory:
+        if (state_ == FlightState::Return && climbing_) return false;
+        // Through, without a stop: the next leg takes the motion over.
+        if (state_ == FlightState::Waypoint && holdTime_ == 0 && leg_ < mission_.legCount) {
+          return within(estimate.positionNed) && within(reference().positionNed);
+        }
+        return trajectory_.arrived() && near(estimate);
+      case Source::Stand:
+        break;
+    }
+    return false;
+  }
+
+  [[nodiscard]] bool within(const Vector3f& positionNed) const {
+    return (positionNed - target_).norm() < radius_;
   }
 
   [[nodiscard]] bool near(const VehicleState& estimate) const {
     const float yawError = wrapAngle(yawOf(estimate.attitude) - targetYaw_);
-    return (estimate.positionNed - target_).norm() < config_.arrivalRadius &&
-           estimate.velocityNed.norm() < config_.arrivalSpeed && yawError < config_.arrivalYaw &&
-           yawError > -config_.arrivalYaw;
+    return within(estimate.positionNed) && estimate.velocityNed.norm() < config_.arrivalSpeed &&
+           yawError < config_.arrivalYaw && yawError > -config_.arrivalYaw;
   }
 
   Mission mission_;
   GuidanceConfig config_;
+  float standThrust_;  ///< N
   ReferenceRamp ramp_;
+  Trajectory trajectory_;
+  Reference tilted_;  ///< that of an attitude leg or of the stand
+  Source source_ = Source::Ramp;
+  FlightState state_ = FlightState::Boot;
   Vector3f target_ = Vector3f::Zero();
   float targetYaw_ = 0.0F;
+  float radius_ = 0.0F;  ///< m, this near is there
   float startYaw_ = 0.0F;
   Micros entered_ = 0;
   Micros holdTime_ = 0;
-  std::uint8_t leg_ = 0;
+  Micros attitudeTime_ = 0;  ///< of an attitude leg
+  Micros part_ = 0;          ///< of the stand's sequence
+  bool climbing_ = false;    ///< to the return height
+  bool stopping_ = false;    ///< a hold is not done before the reference rests
+  bool idles_ = false;
+  std::uint8_t leg_ = 0;  ///< the next one
 };
 
 }  // namespace strix

@@ -74,7 +74,10 @@ class LogHeader {
 
   /// Bytes of the longest header.
   [[nodiscard]] static constexpr std::size_t maxSize() {
-    std::size_t size = sizeof(FileStart) + ulog::kMessageHeader + 40 + kInfos * ulog::kMaxInfo;
+    constexpr std::size_t kSystem =
+        ulog::kMessageHeader + 1 + std::string_view("char[5] sys_nameStrix").size();
+    std::size_t size =
+        sizeof(FileStart) + ulog::kMessageHeader + 40 + kSystem + (kInfos - 1) * ulog::kMaxInfo;
     for (const TopicRow& row : kTopicRows) {
       if (row.instance == 0) size += ulog::kMessageHeader + row.format.size();
       size += ulog::kMessageHeader + 3 + row.name.size();

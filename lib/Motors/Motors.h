@@ -1,48 +1,54 @@
-/// Wrench to motor commands: allocation, limits, thrust curve, arming (DESIGN.md, 5).
+/// Wrench to motor commands: limits, thrust curve, battery voltage, arming (DESIGN.md, 5).
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <string_view>
 
+#include "Allocation.h"
 #include "Mathpk.h"
 #include "Vehicle.h"
 
 namespace strix {
 
 /// Squared rotor speeds of M1..M4, in the vehicle's unit squared.
-using SquaredSpeeds = std::array<float, kMotorCount>;
+using SquaredSpeeds = Allocation<kMotorCount>::Squares;
 
+struct MotorConfig {
+  /// The largest change of a rotor's speed, vehicle's unit per second; 0: no limit. Of speed, not
+  /// of command: what it spares is the torque, and so the current, that speeds a rotor up, and the
+  /// same step of the command is another step of speed on every curve and at every voltage. Where
+  /// it limits, roll and pitch have no priority: each rotor goes its own way to its new speed.
+  float slew = 0.0F;
+  /// Whether commands follow the battery's voltage.
+  bool voltageCompensation = true;
+};
+
+/// Thrust is linear in the wanted wrench: the allocation works in squared speeds, of which thrust
+/// and torque are multiples, and the vehicle's command curve, which is the inverse of what a motor
+/// makes of a command, turns a speed into a command. No other thrust curve is needed.
 class Motors {
  public:
-  explicit Motors(const Vehicle& vehicle)
+  static constexpr float kRateHz = 500.0F;  ///< of commandControl
+
+  explicit Motors(const Vehicle& vehicle, const MotorConfig& config = {})
       : vehicle_(vehicle),
-        squareMin_(vehicle.speedFlightMin * vehicle.speedFlightMin),
-        commandMin_(command(vehicle.speedFlightMin)),
+        config_(config),
+        allocation_(vehicle.rotors, vehicle.thrustConstant, vehicle.torqueConstant),
+        speedTop_(speedOf(vehicle.commandFlightMax)),
+        step_(config.slew / kRateHz),
         revolution_(std::string_view(vehicle.speedUnit) == "rad/s" ? 0.5F / kPi : 1.0F) {
-    const float top = speedOf(vehicle.commandFlightMax);
-    squareMax_ = top * top;
-    // Force on a rotor at (x, y) is -z, so its moment (r x F) is -y about x and +x about y; a rotor
-    // turning clockwise is held by the body, which is turned to the left, -z.
-    for (std::size_t i = 0; i < kMotorCount; ++i) {
-      const Rotor& rotor = vehicle.rotors[i];
-      effect_[kThrust][i] = vehicle.thrustConstant;
-      effect_[kRoll][i] = -rotor.y * vehicle.thrustConstant;
-      effect_[kPitch][i] = rotor.x * vehicle.thrustConstant;
-      effect_[kYaw][i] = -static_cast<float>(rotor.spin) * vehicle.torqueConstant;
-    }
-    // The rows of an X layout are orthogonal (tested), so E E^T is diagonal and the pseudo-inverse
-    // E^T (E E^T)^-1 is each row divided by its squared length, transposed.
-    for (std::size_t row = 0; row < kAxes; ++row) {
-      float square = 0.0F;
-      for (const float e : effect_[row]) square += e * e;
-      for (std::size_t i = 0; i < kMotorCount; ++i) inverse_[row][i] = effect_[row][i] / square;
-    }
+    compensate(1.0F);
     disarm();
   }
 
+  /// False when this layout of rotors cannot fly (Allocation::valid): it never arms.
+  [[nodiscard]] bool valid() const { return allocation_.valid(); }
+
   void arm() {
+    if (!valid()) return;
     armed_ = true;
+    speeds_.fill(speedMin_);  // from stopped to idle at once, whatever the slew limit
     commandControl(Wrench::none());
   }
 
@@ -54,11 +60,22 @@ class Motors {
 
   [[nodiscard]] bool armed() const { return armed_; }
 
+  /// Battery voltage for the commands to come, V; 0 or NaN while it is not known. At one command a
+  /// motor's speed goes with the voltage: an ESC gives it that share of the voltage (back-EMF is
+  /// speed over KV; the winding's own drop is left out, so that this is a little too much), and
+  /// thrust with its square: ArduPilot's MOT_BAT_VOLT_MAX does the same with a curve that is wholly
+  /// quadratic (AP_Motors_Thrust_Linearization, lift_max).
+  void setBatteryVoltage(float volts) {
+    if (volts == voltage_ || !config_.voltageCompensation) return;
+    voltage_ = volts;
+    const float factor = vehicle_.curveVoltage / volts;
+    compensate(volts > 0.0F && factor > 0.0F ? clamp(factor, kFactorMin, kFactorMax) : 1.0F);
+  }
+
   /// Mean speed that the ESCs are told, rev/s; 0 when off. The propellers shake at it.
   [[nodiscard]] float meanRevolutions() const {
-    if (!armed_) return 0.0F;
     float sum = 0.0F;
-    for (const float command : commands_) sum += speedOf(command);
+    for (const float speed : speeds_) sum += speed;
     return sum * (revolution_ / static_cast<float>(kMotorCount));
   }
 
@@ -78,67 +95,35 @@ class Motors {
       stop();
       return;
     }
-    const bool valid = plausible(wanted.thrust) && plausible(wanted.torque.x()) &&
-                       plausible(wanted.torque.y()) && plausible(wanted.torque.z());
-    if (!valid) ++invalid_;
-    const SquaredSpeeds squares = allocateControl(valid ? wanted : Wrench::none());
+    const bool sane = plausible(wanted.thrust) && plausible(wanted.torque.x()) &&
+                      plausible(wanted.torque.y()) && plausible(wanted.torque.z());
+    if (!sane) ++invalid_;
+    SquaredSpeeds squares = allocateControl(sane ? wanted : Wrench::none());
     for (std::size_t i = 0; i < kMotorCount; ++i) {
-      commands_[i] = clamp(command(squareRoot(squares[i])), commandMin_, vehicle_.commandFlightMax);
+      float speed = squareRoot(squares[i]);
+      if (step_ > 0.0F) {
+        const float next = clamp(speed, speeds_[i] - step_, speeds_[i] + step_);
+        speed = clamp(next, speedMin_, speedMax_);  // which move with the voltage
+        squares[i] = speed * speed;
+      }
+      speeds_[i] = speed;
+      commands_[i] = clamp(command(speed * factor_), commandMin_, vehicle_.commandFlightMax);
     }
-    achieved_ = wrenchOf(squares);
+    achieved_ = allocation_.wrenchOf(squares);
   }
 
   /// Squared speeds for a finite wrench: exact when they can be within the limits; otherwise roll
   /// and pitch torque are kept first, then thrust, then yaw torque; no torque changes its sign.
   [[nodiscard]] SquaredSpeeds allocateControl(const Wrench& wanted) const {
-    SquaredSpeeds tilting{};  // share of roll and pitch torque
-    SquaredSpeeds turning{};  // share of yaw torque
-    for (std::size_t i = 0; i < kMotorCount; ++i) {
-      tilting[i] = inverse_[kRoll][i] * wanted.torque.x() + inverse_[kPitch][i] * wanted.torque.y();
-      turning[i] = inverse_[kYaw][i] * wanted.torque.z();
-    }
-
-    // Roll and pitch: all of it when the spread fits between the limits. The motor that gives most
-    // and the one that gives least stand opposite and spin alike, so yaw cannot make more room.
-    const Range spread = rangeOf(tilting);
-    const float room = squareMax_ - squareMin_;
-    if (spread.high - spread.low > room) {
-      const float scale = room / (spread.high - spread.low);
-      for (float& share : tilting) share *= scale;
-    }
-
-    // Thrust: the nearest that some part f of the yaw torque, 0 <= f <= 1, allows.
-    const float mostThrust = squareMax_ - lowestPeak(tilting, turning, 1.0F);
-    const float leastThrust = squareMin_ + lowestPeak(tilting, turning, -1.0F);
-    const float level = clamp(inverse_[kThrust][0] * wanted.thrust, leastThrust, mostThrust);
-
-    // Yaw: the largest part that keeps every motor within its limits.
-    float part = 1.0F;
-    for (std::size_t i = 0; i < kMotorCount; ++i) {
-      const float base = level + tilting[i];
-      const float up = turning[i];
-      if (base + up > squareMax_ && up > 0.0F) part = smaller(part, (squareMax_ - base) / up);
-      if (base + up < squareMin_ && up < 0.0F) part = smaller(part, (squareMin_ - base) / up);
-    }
-    if (part < 0.0F) part = 0.0F;
-
-    SquaredSpeeds squares{};
-    for (std::size_t i = 0; i < kMotorCount; ++i) {
-      squares[i] = clamp(level + tilting[i] + part * turning[i], squareMin_, squareMax_);
-    }
-    return squares;
+    return allocation_.solve(wanted);
   }
 
   /// Wrench of rotors at these squared speeds.
   [[nodiscard]] Wrench wrenchOf(const SquaredSpeeds& squares) const {
-    std::array<float, kAxes> sum{};
-    for (std::size_t row = 0; row < kAxes; ++row) {
-      for (std::size_t i = 0; i < kMotorCount; ++i) sum[row] += effect_[row][i] * squares[i];
-    }
-    return {sum[kThrust], {sum[kRoll], sum[kPitch], sum[kYaw]}};
+    return allocation_.wrenchOf(squares);
   }
 
-  /// ESC command of rotor speed n.
+  /// ESC command of rotor speed n at the voltage of the command curve.
   [[nodiscard]] float command(float n) const {
     const CommandCurve& c = vehicle_.command;
     return c.offset + (c.linear + c.quadratic * n) * n;
@@ -162,20 +147,21 @@ class Motors {
   /// M1..M4 in the vehicle's command unit.
   [[nodiscard]] const EscCommands& commands() const { return commands_; }
 
-  /// The wrench these commands give when the motors have settled.
+  /// The wrench these commands give, at the battery voltage last told, when the motors have
+  /// settled.
   [[nodiscard]] const Wrench& achieved() const { return achieved_; }
+
+  /// Factor on a rotor's speed in its command: above 1 with a battery below the command curve's.
+  [[nodiscard]] float supply() const { return factor_; }
 
   /// Wrenches that were not plausible, since the start.
   [[nodiscard]] std::uint32_t invalid() const { return invalid_; }
 
  private:
-  enum Axis : std::size_t { kThrust, kRoll, kPitch, kYaw, kAxes };
-  static constexpr float kBeyondAny = 1e30F;  ///< squared speed
-
-  struct Range {
-    float low;
-    float high;
-  };
+  // ours: the factors of 4.5 and 2.8 V a cell where the curve holds at 3.8: whoever says more or
+  // less does not know, and a wrong voltage costs no more thrust than that.
+  static constexpr float kFactorMin = 0.85F;
+  static constexpr float kFactorMax = 1.35F;
 
   /// False for NaN and beyond any sense (N or N m); what is left overflows nowhere.
   [[nodiscard]] static bool plausible(float value) { return value > -1e6F && value < 1e6F; }
@@ -186,47 +172,38 @@ class Motors {
     return smaller(larger(v, low), high);
   }
 
-  [[nodiscard]] static Range rangeOf(const SquaredSpeeds& s) {
-    return {smaller(smaller(s[0], s[1]), smaller(s[2], s[3])),
-            larger(larger(s[0], s[1]), larger(s[2], s[3]))};
-  }
-
-  /// Smallest over 0 <= f <= 1 of the largest side (tilting + f turning), side +1 or -1: with the
-  /// best part of the yaw torque, how far above (+1) or below (-1) the mean a motor must reach.
-  /// Yaw lifts one pair of rotors and lowers the other alike: the best f levels the pairs' peaks.
-  [[nodiscard]] static float lowestPeak(const SquaredSpeeds& tilting, const SquaredSpeeds& turning,
-                                        float side) {
-    float step = 0.0F;
-    float lifted = -kBeyondAny;   // peak of the pair that yaw lifts
-    float lowered = -kBeyondAny;  // peak of the other
-    for (std::size_t i = 0; i < kMotorCount; ++i) {
-      const float share = side * tilting[i];
-      const float turn = side * turning[i];
-      if (turn > 0.0F) {
-        step = turn;
-        lifted = larger(lifted, share);
-      } else {
-        lowered = larger(lowered, share);
-      }
-    }
-    const float lift = clamp(0.5F * (lowered - lifted), 0.0F, step);
-    return larger(lifted + lift, lowered - lift);
+  /// From now on a speed n needs the command of factor n. The cap is one of the command: with a low
+  /// battery it is a lower speed. Idle is never a lower command than on the curve, because an ESC
+  /// stops its motor at a command, not at a speed: with a full battery it is a faster idle.
+  void compensate(float factor) {
+    factor_ = factor;
+    const float idle = vehicle_.speedFlightMin * larger(factor, 1.0F);
+    commandMin_ = command(idle);
+    speedMin_ = idle / factor;
+    speedMax_ = speedTop_ / factor;
+    allocation_.setLimits(speedMin_ * speedMin_, speedMax_ * speedMax_);
   }
 
   void stop() {
     commands_.fill(vehicle_.commandOff);
+    speeds_.fill(0.0F);
     achieved_ = Wrench::none();
   }
 
   const Vehicle& vehicle_;
-  std::array<std::array<float, kMotorCount>, kAxes> effect_{};   ///< wrench per squared speed
-  std::array<std::array<float, kMotorCount>, kAxes> inverse_{};  ///< its pseudo-inverse, transposed
-  float squareMin_;
-  float squareMax_ = 0.0F;
-  float commandMin_;
+  MotorConfig config_;
+  Allocation<kMotorCount> allocation_;
+  float speedTop_;    ///< of the cap in flight on the command curve
+  float step_;        ///< most that a speed changes from one command to the next; 0: no limit
   float revolution_;  ///< of one unit of the vehicle's rotor speed, rev/s
+  float voltage_ = 0.0F;
+  float factor_ = 1.0F;  ///< voltage of the command curve over that of the battery
+  float commandMin_ = 0.0F;
+  float speedMin_ = 0.0F;
+  float speedMax_ = 0.0F;
   bool armed_ = false;
   EscCommands commands_{};
+  std::array<float, kMotorCount> speeds_{};  ///< that the commands give, settled
   Wrench achieved_;
   std::uint32_t invalid_ = 0;
 };

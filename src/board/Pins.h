@@ -28,6 +28,13 @@ constexpr I2cPins kSlowBus{17, 16};
 constexpr std::uint8_t kGpsRx = 7;
 constexpr std::uint8_t kGpsTx = 8;
 
+/// Only for an airframe whose ESCs answer over I2C (LPI2C4, Wire2): docs/board.md.
+constexpr I2cPins kEscBus{25, 24};
+
+/// Battery voltage by a divider on A17. Without one the ratio is 0 and the pin is not read.
+constexpr std::uint8_t kBattery = 41;
+constexpr float kBatteryRatio = 0.0F;  ///< (R1 + R2) / R2, battery over pin
+
 /// Pilot's switches, each between its pin and ground, with the Teensy's pull-up (about 22 kOhm).
 /// Arm and start close to switch on, so a broken wire is off. Kill is a loop that is closed in
 /// normal use: a broken wire, or a plug pulled out, kills. A kill that can fail without being seen

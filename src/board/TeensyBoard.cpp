@@ -4,6 +4,7 @@ namespace strix {
 
 SensorSet TeensyBoard::begin() {
   esc_.begin();
+  battery_.begin();
   arm_.begin();
   kill_.begin();
   start_.begin();

@@ -8,6 +8,7 @@
 #include "Vehicle.h"
 
 #include "BaroBmp390.h"
+#include "Battery.h"
 #include "EscPwm.h"
 #include "GpsMtk3333.h"
 #include "I2cBus.h"
@@ -39,9 +40,10 @@ class TeensyBoard {
   [[nodiscard]] bool readAlt(AltRaw& out) { return baro_.read(out); }
   [[nodiscard]] bool readGps(GpsRaw& out) { return gps_.read(out); }
 
-  // Not fitted on this aircraft: PWM ESCs do not answer.
-  [[nodiscard]] static bool readBattery(BatteryRaw& /*out*/) { return false; }
+  [[nodiscard]] bool readBattery(BatteryRaw& out) { return battery_.read(out); }
+  /// ESCs by pulse width do not answer; EscI2c's do.
   [[nodiscard]] static bool readEscStatus(EscRaw& /*out*/) { return false; }
+  /// No receiver yet.
   [[nodiscard]] static PilotSticks readSticks() { return {}; }
 
   void countFaults(SensorFaultCounts& out) const;
@@ -54,6 +56,7 @@ class TeensyBoard {
 
  private:
   EscPwm esc_;
+  Battery battery_{pins::kBattery, pins::kBatteryRatio};
   Switch arm_{pins::kArmSwitch, false};
   Switch kill_{pins::kKillSwitch, true};
   Switch start_{pins::kStartSwitch, false};

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "FakeFlexPwm.h"
 #include "FakeTeensy.h"
 
 // Names that the core takes from everybody: a header that calls a matrix F, or that includes Eigen

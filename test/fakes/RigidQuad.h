@@ -20,7 +20,7 @@ class RigidQuad {
 
   void step(const strix::EscCommands& commands, double dt) {
     Eigen::Vector3d force = Eigen::Vector3d::Zero();
-    Eigen::Vector3d torque = Eigen::Vector3d::Zero();
+    Eigen::Vector3d torque = torqueBody;
     for (std::size_t i = 0; i < 4; ++i) {
       speeds_[i] += (speedOf(commands[i]) - speeds_[i]) * (1.0 - std::exp(-dt / lag()));
       const double square = speeds_[i] * speeds_[i];
@@ -35,7 +35,8 @@ class RigidQuad {
     const Eigen::Vector3d inertia(vehicle_.inertia[0], vehicle_.inertia[1], vehicle_.inertia[2]);
     const Eigen::Vector3d momentum = inertia.cwiseProduct(rate);
     rate += dt * (torque - rate.cross(momentum)).cwiseQuotient(inertia);
-    velocity += dt * (attitude_ * force / vehicle_.mass + Eigen::Vector3d(0.0, 0.0, kGravity));
+    force = attitude_ * force + forceNed;
+    velocity += dt * (force / vehicle_.mass + Eigen::Vector3d(0.0, 0.0, kGravity));
     position += dt * velocity;
     const double angle = rate.norm() * dt;
     if (angle > 0.0) attitude_ = attitude_ * Eigen::AngleAxisd(angle, rate.normalized());
@@ -67,6 +68,9 @@ class RigidQuad {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< m, NED
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s, NED
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();      ///< rad/s, FRD
+  // What disturbs it.
+  Eigen::Vector3d forceNed = Eigen::Vector3d::Zero();    ///< N
+  Eigen::Vector3d torqueBody = Eigen::Vector3d::Zero();  ///< N m, FRD
 
  private:
   static constexpr double kGravity = 9.80665;

@@ -8,3 +8,4 @@ void runMagTests();
 void runBaroTests();
 void runSensorFaultTests();
 void runGpsTests();
+void runEscPwmTests();

@@ -15,6 +15,7 @@ int main() {
   runBaroTests();
   runSensorFaultTests();
   runGpsTests();
+  runEscPwmTests();
   UNITY_END();
   return 0;
 }

@@ -4,6 +4,7 @@
 void runTextTests();
 void runSensorTests();
 void runMotorTests();
+void runEscCalibrationTests();
 void runAxisTests();
 void runManualTests();
 void runHeapTests();

@@ -10,6 +10,7 @@ int main() {
   runTextTests();
   runSensorTests();
   runMotorTests();
+  runEscCalibrationTests();
   runAxisTests();
   runManualTests();
   runHeapTests();

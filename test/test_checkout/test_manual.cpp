@@ -79,6 +79,19 @@ void test_the_manual_shows_a_motor_test() {
   shown(text + bench.say("motor 1", 5.2F));
 }
 
+void test_the_manual_shows_how_escs_are_taught() {
+  CheckoutBench bench;
+  bench.begin();
+  std::string text = "> " + bench.say("teach escs");
+  for (const char* line : {"props off", "teach escs", "battery off"}) text += bench.say(line);
+  text += bench.say("teach escs", 3.1F);
+  bench.output.clear();
+  bench.input += " ";
+  bench.run(0.1F);
+  const std::string ended = trimmed(bench.output);
+  shown(text + ended.substr(0, ended.rfind("\n> ")));
+}
+
 void test_the_manual_shows_the_pilots_switches() {
   CheckoutBench bench;
   bench.begin();
@@ -102,4 +115,5 @@ void runManualTests() {
   RUN_TEST(test_the_manual_shows_the_pilots_switches);
   RUN_TEST(test_the_manual_shows_the_axes);
   RUN_TEST(test_the_manual_shows_a_motor_test);
+  RUN_TEST(test_the_manual_shows_how_escs_are_taught);
 }

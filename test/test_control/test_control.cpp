@@ -10,6 +10,11 @@ int main() {
   runControllerTests();
   runReferenceRampTests();
   runGainVectorTests();
+  runReducedObserverTests();
+  runTrajectoryTests();
+  runControlLimitsTests();
+  runIntegralActionTests();
+  runReferenceFilterTests();
   UNITY_END();
   return 0;
 }

@@ -1,8 +1,5 @@
-#include <Controller.h>
-#include <Motors.h>
 #include <ReferenceRamp.h>
 #include <unity.h>
-#include <vehicles/Vehicles.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +7,7 @@
 #include <vector>
 
 #include "AssertNear.h"
-#include "RigidQuad.h"
+#include "ControlLoop.h"
 #include "suites.h"
 
 using namespace strix;
@@ -18,76 +15,13 @@ using namespace strix;
 namespace {
 
 constexpr float kDeg = kDegToRad;
-constexpr Micros kPeriod = 2000;
-constexpr double kPeriodS = 2e-3;
-constexpr float kHeadings[] = {0.0F, 90.0F * kDeg, 180.0F * kDeg, -135.0F * kDeg};
 
 /// The wrench one control step asks for.
 Wrench ask(const Reference& reference, const VehicleState& state) {
-  Controller controller(kQuad5in, kQuad5inGains);
+  Controller controller(kQuad5in, kPlainDesign, unfiltered());
   controller.reset(0);
   TEST_ASSERT_TRUE(controller.updateControl(0, reference, state));
   return controller.getControl();
-}
-
-VehicleState facing(float yaw, const Vector3f& position = Vector3f::Zero()) {
-  VehicleState state;
-  state.positionNed = position;
-  state.attitude = eulerToQuaternion({0.0F, 0.0F, yaw});
-  return state;
-}
-
-Reference at(const Vector3f& position, float yaw) {
-  Reference reference;
-  reference.positionNed = position;
-  reference.yaw = yaw;
-  return reference;
-}
-
-/// Controller, motors and aircraft in a closed loop at 500 Hz, with a perfect estimate.
-class Loop {
- public:
-  Loop(const Airframe& airframe, float yaw)
-      : quad(airframe.vehicle, yaw),
-        controller(airframe.vehicle, airframe.gains),
-        vehicle_(airframe.vehicle),
-        motors_(airframe.vehicle) {
-    controller.reset(0);
-    motors_.arm();
-  }
-
-  void step(const Reference& reference) {
-    TEST_ASSERT_TRUE(controller.updateControl(now, reference, quad.state()));
-    motors_.commandControl(controller.getControl());
-    controller.setAchieved(motors_.achieved());
-    for (int part = 0; part < 4; ++part) quad.step(motors_.commands(), kPeriodS / 4);
-    now += kPeriod;
-    largestTilt = std::max(largestTilt, quad.tilt());
-    for (const float command : motors_.commands()) {
-      largestCommand = std::max(largestCommand, command);
-      capped = capped || command >= vehicle_.commandFlightMax;
-    }
-  }
-
-  RigidQuad quad;
-  Controller controller;
-  Micros now = 0;
-  double largestTilt = 0.0;
-  float largestCommand = 0.0F;
-  bool capped = false;
-
- private:
-  const Vehicle& vehicle_;
-  Motors motors_;
-};
-
-/// North, east, down to ahead, right, down of where the flight started.
-Eigen::Vector3d inStartFrame(const Eigen::Vector3d& ned, float yaw) {
-  return Eigen::AngleAxisd(-yaw, Eigen::Vector3d::UnitZ()) * ned;
-}
-
-Vector3f fromStartFrame(const Vector3f& ahead, float yaw) {
-  return rotateToNed(eulerToQuaternion({0.0F, 0.0F, yaw}), ahead);
 }
 
 struct Sample {
@@ -95,8 +29,8 @@ struct Sample {
   Eigen::Quaterniond attitude;  ///< from the start's
 };
 
-std::vector<Sample> flyFrom(const Airframe& airframe, float yaw) {
-  Loop loop(airframe, yaw);
+std::vector<Sample> flyFrom(const Flown& airframe, float yaw) {
+  Loop loop(airframe.vehicle, airframe.gains, yaw);
   const Eigen::Quaterniond start = loop.quad.attitude();
   const Reference reference = at(fromStartFrame({4.0F, 2.0F, -1.0F}, yaw), yaw + 100.0F * kDeg);
   std::vector<Sample> samples;
@@ -109,7 +43,7 @@ std::vector<Sample> flyFrom(const Airframe& airframe, float yaw) {
 }
 
 void test_position_and_yaw_response_are_the_same_at_every_heading() {
-  for (const Airframe& airframe : kAirframes) {
+  for (const Flown& airframe : kDesigns) {
     const std::vector<Sample> north = flyFrom(airframe, 0.0F);
     // It went there: the comparison is of flights, not of standing still.
     TEST_ASSERT_TRUE((north.back().position - Eigen::Vector3d(4.0, 2.0, -1.0)).norm() < 0.2);
@@ -207,15 +141,15 @@ void test_a_tilted_aircraft_still_carries_its_weight_up_to_45_deg() {
       TEST_ASSERT_TRUE(vertical < weight);
     }
     // Beyond, no more than at the limit: a crash is not to be made with full power.
-    TEST_ASSERT_TRUE(ask(at({0, 0, 0}, 0.3F), state).thrust <= weight / ControlLimits{}.cosTilt);
+    TEST_ASSERT_TRUE(ask(at({0, 0, 0}, 0.3F), state).thrust <= weight / ControlConfig{}.cosTilt);
   }
 }
 
 void test_a_position_step_settles_in_10_s_without_overshoot() {
-  for (const Airframe& airframe : kAirframes) {
+  for (const Flown& airframe : kDesigns) {
     for (const Vector3f& there : {Vector3f(1.0F, 0.0F, 0.0F), Vector3f(0.0F, 1.0F, 0.0F),
                                   Vector3f(0.0F, 0.0F, -1.0F), Vector3f(0.0F, 0.0F, 1.0F)}) {
-      Loop loop(airframe, 0.0F);
+      Loop loop(airframe.vehicle, airframe.gains, 0.0F);
       const Eigen::Vector3d direction = there.cast<double>();
       double settled = 0.0;
       double furthest = 0.0;
@@ -223,7 +157,7 @@ void test_a_position_step_settles_in_10_s_without_overshoot() {
         loop.step(at(there, 0.0F));
         const double along = direction.dot(loop.quad.position);
         furthest = std::max(furthest, along);
-        if (std::abs(along - 1.0) > 0.02) settled = (k + 1) * kPeriodS;
+        if (std::abs(along - 1.0) > 0.02) settled = (k + 1) * kControlStepS;
         // Nothing sideways: the axes do not touch but for the thrust lost to 5 deg of tilt.
         TEST_ASSERT_TRUE((loop.quad.position - along * direction).norm() < 0.01);
       }
@@ -240,9 +174,10 @@ void test_a_position_step_settles_in_10_s_without_overshoot() {
 }
 
 void test_a_reference_far_away_does_not_tip_the_aircraft_over() {
-  for (const Airframe& airframe : kAirframes) {
-    for (const float bearing : {0.0F, 45.0F * kDeg, -120.0F * kDeg}) {
-      Loop loop(airframe, 0.0F);
+  for (const Flown& airframe : kDesigns) {
+    for (const bool filtered : {true, false}) {
+      const float bearing = filtered ? 45.0F * kDeg : -120.0F * kDeg;
+      Loop loop(airframe.vehicle, airframe.gains, 0.0F, filtered ? ControlConfig{} : unfiltered());
       const Vector3f there = fromStartFrame({60.0F, 0.0F, -20.0F}, bearing);
       double furthest = 0.0;
       double fastest = 0.0;
@@ -250,23 +185,25 @@ void test_a_reference_far_away_does_not_tip_the_aircraft_over() {
         loop.step(at(there, 170.0F * kDeg));
         fastest = std::max(fastest, loop.quad.velocity.head<2>().norm());
         furthest = std::max(furthest, inStartFrame(loop.quad.position, bearing).x());
-        TEST_ASSERT_TRUE(std::abs(inStartFrame(loop.quad.position, bearing).y()) < 0.5);
+        TEST_ASSERT_TRUE(std::abs(inStartFrame(loop.quad.position, bearing).y()) < 0.7);
       }
-      TEST_ASSERT_TRUE(loop.largestTilt < 15.0 * kDeg);
-      TEST_ASSERT_TRUE(fastest < 1.5);
-      TEST_ASSERT_TRUE(furthest < 60.0 * 1.001);
+      TEST_ASSERT_TRUE(loop.largestTilt < 25.0 * kDeg);
+      // The filter's 2 m/s and what is made up of the start; or where the limits of position and
+      // velocity balance.
+      TEST_ASSERT_TRUE(fastest < 2.6);
+      // Integral action pays for the last 2 m of an unfiltered jump with an overshoot of less.
+      TEST_ASSERT_TRUE(furthest < 60.0 + (filtered ? 0.05 : 0.6));
       TEST_ASSERT_TRUE((loop.quad.position - there.cast<double>()).norm() < 0.01);
-      TEST_ASSERT_FALSE(loop.capped);
     }
   }
 }
 
 void test_a_shove_is_recovered_from() {
-  for (const Airframe& airframe : kAirframes) {
+  for (const Flown& airframe : kDesigns) {
     for (const Eigen::Vector3d& shove :
          {Eigen::Vector3d(4.0, 0.0, 0.0), Eigen::Vector3d(0.0, -4.0, 0.0),
           Eigen::Vector3d(2.0, 2.0, 2.0)}) {
-      Loop loop(airframe, 0.0F);
+      Loop loop(airframe.vehicle, airframe.gains, 0.0F);
       loop.quad.rate = shove;            // rad/s
       loop.quad.velocity = 0.5 * shove;  // m/s
       for (int k = 0; k < 10000; ++k) loop.step({});
@@ -277,12 +214,12 @@ void test_a_shove_is_recovered_from() {
 }
 
 void test_a_ramp_is_followed_closely_at_every_heading() {
-  // What the attitude loop's lag, 0.1 s and 0.25 s with the motors, leaves behind at 1 m/s^2 and
-  // 1 m/s until the position loop has taken it back.
-  const double allowed[] = {0.25, 0.6};  // m
-  for (std::size_t i = 0; i < kAirframes.size(); ++i) {
+  // What the attitude loop's lag leaves behind at 1 m/s^2 and 1 m/s until the position loop has
+  // taken it back: 0.25 s for the slowest, the published design.
+  const double allowed = 0.25;  // m
+  for (const Flown& airframe : kDesigns) {
     for (const float yaw : kHeadings) {
-      Loop loop(kAirframes[i], yaw);
+      Loop loop(airframe.vehicle, airframe.gains, yaw);
       ReferenceRamp ramp;
       ramp.reset(0, loop.quad.state());
       ramp.setTarget(fromStartFrame({5.0F, 3.0F, -2.0F}, yaw), yaw + 90.0F * kDeg);
@@ -290,7 +227,7 @@ void test_a_ramp_is_followed_closely_at_every_heading() {
         const Reference& reference = ramp.update(loop.now);
         loop.step(reference);
         const Eigen::Vector3d behind = loop.quad.position - reference.positionNed.cast<double>();
-        TEST_ASSERT_TRUE(behind.norm() < allowed[i]);
+        TEST_ASSERT_TRUE(behind.norm() < allowed);
       }
       TEST_ASSERT_TRUE(ramp.arrived());
       const Eigen::Vector3d end = inStartFrame(loop.quad.position, yaw);
@@ -304,7 +241,7 @@ void test_a_ramp_is_followed_closely_at_every_heading() {
 void test_an_acceleration_fed_forward_gives_that_acceleration() {
   for (const float yaw : kHeadings) {
     // Tilted as the attitude reference says, the wanted thrust alone gives the acceleration.
-    Controller controller(kQuad5in, kQuad5inGains);
+    Controller controller(kQuad5in, kPlainDesign, unfiltered());
     controller.reset(0);
     Reference reference = at({0, 0, 0}, yaw);
     reference.accelerationNed = {0.8F, -0.5F, -0.3F};
@@ -324,7 +261,7 @@ void test_an_acceleration_fed_forward_gives_that_acceleration() {
 
 void test_control_runs_500_times_a_second_in_a_loop_of_any_pace() {
   for (const Micros pass : {Micros{100}, Micros{1000}, Micros{1400}, Micros{1999}}) {
-    Controller controller(kQuad5in, kQuad5inGains);
+    Controller controller(kQuad5in, kPlainDesign, unfiltered());
     const Micros start = 0xFFFF0000U;  // the clock wraps on the way
     controller.reset(start);
     int steps = 0;
@@ -344,18 +281,18 @@ void test_an_estimate_that_is_not_a_number_commands_nothing_and_is_counted() {
   bad[2].attitude.w = kNaN;
   bad[3].attitude.z = kNaN;
   bad[4].rateBody.z() = std::numeric_limits<float>::infinity();
-  Controller controller(kQuad5in, kQuad5inGains);
+  Controller controller(kQuad5in, kPlainDesign, unfiltered());
   controller.reset(0);
   Micros now = 0;
   std::uint32_t count = 0;
   for (const VehicleState& state : bad) {
     TEST_ASSERT_TRUE(controller.updateControl(now, {}, {}));
     TEST_ASSERT_TRUE(controller.getControl().thrust > 1.0F);
-    TEST_ASSERT_TRUE(controller.updateControl(now += kPeriod, {}, state));
+    TEST_ASSERT_TRUE(controller.updateControl(now += kControlStep, {}, state));
     TEST_ASSERT_EQUAL_UINT32(++count, controller.invalid());
     TEST_ASSERT_EQUAL_FLOAT(0.0F, controller.getControl().thrust);
     TEST_ASSERT_TRUE(controller.getControl().torque.isZero(0.0F));
-    now += kPeriod;
+    now += kControlStep;
   }
   Reference reference;
   reference.yaw = std::numeric_limits<float>::infinity();
@@ -364,7 +301,7 @@ void test_an_estimate_that_is_not_a_number_commands_nothing_and_is_counted() {
 }
 
 void test_the_log_can_tell_reference_error_and_achieved_wrench() {
-  Controller controller(kQuad5in, kQuad5inGains);
+  Controller controller(kQuad5in, kPlainDesign, unfiltered());
   controller.reset(0);
   TEST_ASSERT_TRUE(controller.updateControl(0, at({1.0F, 0.0F, 0.0F}, 0.3F), facing(0.1F)));
   // Level, at the reference yaw.

@@ -232,6 +232,18 @@ void test_a_gap_in_the_loop_does_not_make_the_reference_jump() {
   TEST_ASSERT_FLOAT_WITHIN(1e-4F, before + 0.1F, ramp.reference().positionNed.x());
 }
 
+void test_a_lower_speed_on_the_way_is_met_by_braking() {
+  Watched flight(standing({0.0F, 0.0F, -3.0F}, 0.0F));  // checks the acceleration at every step
+  flight.ramp.setTarget({0.0F, 0.0F, 0.0F}, 0.0F);
+  for (int k = 0; k < 1000; ++k) flight.step();
+  TEST_ASSERT_FLOAT_WITHIN(1e-4F, 0.7F, flight.ramp.reference().velocityNed.z());
+  flight.ramp.setVerticalSpeed(0.3F);
+  for (int k = 0; k < 250; ++k) flight.step();
+  TEST_ASSERT_FLOAT_WITHIN(1e-4F, 0.3F, flight.ramp.reference().velocityNed.z());
+  flight.run();
+  assertNear(0.0F, Vector3f(0.0F, 0.0F, 0.0F), flight.ramp.reference().positionNed);
+}
+
 void test_a_target_that_is_not_a_number_is_ignored() {
   constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
   Watched flight(standing({1.0F, 0.0F, 0.0F}, 0.0F));
@@ -255,5 +267,6 @@ void runReferenceRampTests() {
   RUN_TEST(test_a_long_way_takes_its_time_however_fast_the_loop);
   RUN_TEST(test_a_target_a_hair_away_is_met);
   RUN_TEST(test_a_gap_in_the_loop_does_not_make_the_reference_jump);
+  RUN_TEST(test_a_lower_speed_on_the_way_is_met_by_braking);
   RUN_TEST(test_a_target_that_is_not_a_number_is_ignored);
 }

@@ -1,4 +1,4 @@
-// The state machine's table, walked whole: 8 states times 2^15 sets of conditions.
+// The state machine's table, walked whole: 10 states times 2^18 sets of conditions.
 #include <unity.h>
 
 #include <array>
@@ -16,8 +16,9 @@ namespace {
 
 constexpr ConditionSet kAllSets = ConditionSet{1} << condition::kCount;
 constexpr std::array<FlightState, kStateCount> kAllStates{
-    FlightState::Boot, FlightState::Idle,     FlightState::Armed, FlightState::Takeoff,
-    FlightState::Hold, FlightState::Waypoint, FlightState::Land,  FlightState::Safe};
+    FlightState::Boot,          FlightState::Idle,     FlightState::Armed, FlightState::Takeoff,
+    FlightState::Hold,          FlightState::Waypoint, FlightState::Land,  FlightState::Safe,
+    FlightState::AttitudeStand, FlightState::Return};
 
 /// The state after one update.
 FlightState next(FlightState state, ConditionSet conditions) {
@@ -46,9 +47,11 @@ FiniteStateMachine machineIn(FlightState state) {
   step(kCalibrated);
   step(kArmEdge);
   if (state == FlightState::Safe) step(kKill);
+  if (state == FlightState::AttitudeStand) step(kStart | kStandMission);
   step(kStart);
   step(kArrived);
   if (state == FlightState::Waypoint) step(kHoldDone | kLegsRemain);
+  if (state == FlightState::Return) step(kReturn);
   step(kHoldDone);
   TEST_ASSERT_TRUE(machine.state() == state);
   return machine;
@@ -74,10 +77,11 @@ void test_motors_are_off_in_boot_idle_and_safe_and_on_elsewhere() {
   }
 }
 
-void test_the_controller_reaches_the_motors_in_flight_only() {
+void test_the_controller_reaches_the_motors_in_flight_and_on_the_stand_only() {
   for (const FlightState state : kAllStates) {
-    const bool flying = motorsOn(state) && state != FlightState::Armed;
-    TEST_ASSERT_TRUE(propertiesOf(state).controller == flying);
+    const bool controlled = motorsOn(state) && state != FlightState::Armed;
+    TEST_ASSERT_TRUE(propertiesOf(state).controller == controlled);
+    const bool flying = controlled && state != FlightState::AttitudeStand;
     TEST_ASSERT_TRUE(((kFlying & in(state)) != 0) == flying);
   }
 }
@@ -105,17 +109,29 @@ void test_one_update_takes_at_most_one_transition() {
   }
 }
 
+/// Critical conditions that count in this state: a stand has no place, so no fence.
+ConditionSet criticalIn(FlightState state, ConditionSet set) {
+  const bool onStand = state == FlightState::AttitudeStand ||
+                       (state == FlightState::Armed && (set & condition::kStandMission) != 0);
+  return onStand ? kCritical & ~condition::kOutsideFence : kCritical;
+}
+
 void test_each_critical_condition_stops_the_motors_whatever_else_is_there() {
-  ConditionSet critical = 0;
-  for (const ConditionSet one : {condition::kKill, condition::kUpset, condition::kOutsideFence,
-                                 condition::kImuLost, condition::kEstimatorUnhealthy}) {
-    critical |= one;
-    forAll([one](FlightState state, ConditionSet set) {
-      if (!motorsOn(state) || (set & one) == 0) return;
-      TEST_ASSERT_TRUE(next(state, set) == FlightState::Safe);
-    });
-  }
-  TEST_ASSERT_EQUAL_HEX32(kCritical, critical);
+  TEST_ASSERT_EQUAL_HEX32(condition::kKill | condition::kUpset | condition::kOutsideFence |
+                              condition::kImuLost | condition::kEstimatorUnhealthy,
+                          kCritical);
+  forAll([](FlightState state, ConditionSet set) {
+    if (!motorsOn(state) || (set & criticalIn(state, set)) == 0) return;
+    TEST_ASSERT_TRUE(next(state, set) == FlightState::Safe);
+  });
+}
+
+void test_the_fence_does_not_count_on_the_stand() {
+  forAll([](FlightState state, ConditionSet set) {
+    if (!motorsOn(state) || (criticalIn(state, set) & condition::kOutsideFence) != 0) return;
+    TEST_ASSERT_TRUE(findTransition(state, set) ==
+                     findTransition(state, set & ~condition::kOutsideFence));
+  });
 }
 
 void test_switching_off_stops_the_motors_in_one_update_whatever_else_is_there() {
@@ -185,14 +201,50 @@ void test_touch_down_acts_while_landing_only() {
 }
 
 void test_each_row_of_the_table_applies_in_each_state_it_names() {
-  for (const Transition& row : kTransitions) {
-    StateSet reached = 0;
-    forAll([&](FlightState state, ConditionSet set) {
-      if (findTransition(state, set) == &row) reached = static_cast<StateSet>(reached | in(state));
-    });
-    TEST_ASSERT_EQUAL_HEX16_MESSAGE(row.from, reached, row.said);
+  std::array<StateSet, kTransitions.size()> reached{};
+  forAll([&reached](FlightState state, ConditionSet set) {
+    const Transition* row = findTransition(state, set);
+    if (row == nullptr) return;
+    StateSet& states = reached[static_cast<std::size_t>(row - kTransitions.data())];
+    states = static_cast<StateSet>(states | in(state));
+  });
+  for (std::size_t i = 0; i < kTransitions.size(); ++i) {
+    const Transition& row = kTransitions[i];
+    TEST_ASSERT_EQUAL_HEX16_MESSAGE(row.from, reached[i], row.said);
     TEST_ASSERT_TRUE_MESSAGE(row.said != nullptr && row.said[0] != '\0', "a row says something");
   }
+}
+
+void test_the_stand_is_entered_from_armed_by_its_mission_alone_and_never_flies() {
+  forAll([](FlightState state, ConditionSet set) {
+    const FlightState to = next(state, set);
+    if (to == FlightState::AttitudeStand && state != to) {
+      TEST_ASSERT_TRUE(state == FlightState::Armed);
+      TEST_ASSERT_TRUE((set & condition::kStandMission) != 0 && (set & condition::kStart) != 0);
+    }
+    // With its mission nothing takes off; from it nothing but motors off.
+    if (state == FlightState::Armed && (set & condition::kStandMission) != 0) {
+      TEST_ASSERT_TRUE((kFlying & in(to)) == 0);
+    }
+    if (state == FlightState::AttitudeStand && to != state) TEST_ASSERT_FALSE(motorsOn(to));
+  });
+  TEST_ASSERT_TRUE(next(FlightState::AttitudeStand, condition::kStandDone) == FlightState::Idle);
+}
+
+void test_the_way_home_begins_in_hold_or_on_a_leg_and_ends_in_a_landing() {
+  forAll([](FlightState state, ConditionSet set) {
+    const FlightState to = next(state, set);
+    const bool mayReturn = state == FlightState::Hold || state == FlightState::Waypoint;
+    const bool stays = motorsOn(to) && mayReturn;  // no critical condition, no disarming
+    if (stays && (set & condition::kReturn) != 0) TEST_ASSERT_TRUE(to == FlightState::Return);
+    if (to == FlightState::Return && state != to) {
+      TEST_ASSERT_TRUE(mayReturn && (set & condition::kReturn) != 0);
+    }
+    if (state == FlightState::Return && motorsOn(to)) {
+      const bool arrived = (set & condition::kArrived) != 0;
+      TEST_ASSERT_TRUE(to == (arrived ? FlightState::Land : FlightState::Return));
+    }
+  });
 }
 
 void test_every_state_can_be_reached_from_power_up() {
@@ -260,7 +312,10 @@ void test_every_condition_has_its_bit_and_its_name() {
                                             {kUpset, "Upset"},
                                             {kOutsideFence, "OutsideFence"},
                                             {kImuLost, "ImuLost"},
-                                            {kEstimatorUnhealthy, "EstimatorUnhealthy"}}};
+                                            {kEstimatorUnhealthy, "EstimatorUnhealthy"},
+                                            {kStandMission, "StandMission"},
+                                            {kStandDone, "StandDone"},
+                                            {kReturn, "Return"}}};
   for (std::size_t i = 0; i < kCount; ++i) {
     TEST_ASSERT_EQUAL_HEX32(ConditionSet{1} << i, expected[i].bit);
     TEST_ASSERT_EQUAL_STRING(expected[i].name, kConditionNames[i]);
@@ -299,10 +354,11 @@ int main() {
   UNITY_BEGIN();
   RUN_TEST(test_the_aircraft_starts_in_boot_with_everything_off);
   RUN_TEST(test_motors_are_off_in_boot_idle_and_safe_and_on_elsewhere);
-  RUN_TEST(test_the_controller_reaches_the_motors_in_flight_only);
+  RUN_TEST(test_the_controller_reaches_the_motors_in_flight_and_on_the_stand_only);
   RUN_TEST(test_every_state_has_its_own_row_and_name);
   RUN_TEST(test_one_update_takes_at_most_one_transition);
   RUN_TEST(test_each_critical_condition_stops_the_motors_whatever_else_is_there);
+  RUN_TEST(test_the_fence_does_not_count_on_the_stand);
   RUN_TEST(test_switching_off_stops_the_motors_in_one_update_whatever_else_is_there);
   RUN_TEST(test_arming_takes_an_edge_and_every_check_passed_and_starts_on_the_ground);
   RUN_TEST(test_safe_is_left_only_by_rearming);
@@ -311,6 +367,8 @@ int main() {
   RUN_TEST(test_an_armed_aircraft_that_nobody_starts_disarms);
   RUN_TEST(test_touch_down_acts_while_landing_only);
   RUN_TEST(test_each_row_of_the_table_applies_in_each_state_it_names);
+  RUN_TEST(test_the_stand_is_entered_from_armed_by_its_mission_alone_and_never_flies);
+  RUN_TEST(test_the_way_home_begins_in_hold_or_on_a_leg_and_ends_in_a_landing);
   RUN_TEST(test_every_state_can_be_reached_from_power_up);
   RUN_TEST(test_a_whole_flight_goes_through_its_states_in_order);
   RUN_TEST(test_the_critical_error_flag_stays_until_somebody_rearms);

@@ -15,8 +15,9 @@ namespace strix {
 /// not have to move, and still every state is visited.
 constexpr Mission kLowMission{"low", 0.3F, 500'000, 1, {{{0.1F, -0.1F, 0.3F, 0.1F, 300'000}}}};
 
+/// Without integral action, which would rightly ask for ever more of an aircraft that cannot move.
 [[nodiscard]] inline FlightSoftwareConfig lowFlight() {
-  return flightConfig(kQuad5in, kQuad5inGains, kLowMission, 0.07F);
+  return flightConfig(kQuad5in, kQuad5inGainsNoIntegral, kLowMission, 0.07F);
 }
 
 /// Takes the sensors' ranges away, to see what the software behind them does with such readings.

@@ -8,4 +8,6 @@ void runBadInputTests();
 void runMissionTests();
 void runNavigationUseTests();
 void runCardStallTests();
+void runPowerTests();
+void runStandTests();
 void runHeapTests();

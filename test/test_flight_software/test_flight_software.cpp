@@ -14,6 +14,8 @@ int main() {
   runMissionTests();
   runNavigationUseTests();
   runCardStallTests();
+  runPowerTests();
+  runStandTests();
   runHeapTests();
   UNITY_END();
   return 0;

@@ -11,6 +11,8 @@
 
 using namespace strix;
 
+void runAllocationTests();   // test_allocation.cpp
+void runMotorConfigTests();  // test_motor_config.cpp
 void runMotorVectorTests();  // test_motor_vectors.cpp
 
 namespace {
@@ -343,18 +345,6 @@ void test_the_achieved_wrench_is_what_the_commands_give() {
   }
 }
 
-void test_the_closed_form_holds_for_every_airframe() {
-  for (const Airframe& airframe : kAirframes) {
-    const Dense effect = denseEffect(airframe.vehicle);
-    const Dense square = effect * effect.transpose();
-    for (int i = 0; i < 4; ++i) {
-      for (int j = 0; j < i; ++j) {
-        TEST_ASSERT_TRUE(std::abs(square(i, j)) < 1e-9 * std::sqrt(square(i, i) * square(j, j)));
-      }
-    }
-  }
-}
-
 void test_throttle_goes_from_off_to_the_esc_s_maximum() {
   for (const Airframe& airframe : kAirframes) {
     const Vehicle& vehicle = airframe.vehicle;
@@ -397,8 +387,9 @@ int main() {
   RUN_TEST(test_the_command_curves_are_the_published_ones);
   RUN_TEST(test_the_weight_is_carried_at_hover);
   RUN_TEST(test_the_achieved_wrench_is_what_the_commands_give);
-  RUN_TEST(test_the_closed_form_holds_for_every_airframe);
   RUN_TEST(test_throttle_goes_from_off_to_the_esc_s_maximum);
+  runAllocationTests();
+  runMotorConfigTests();
   runMotorVectorTests();
   UNITY_END();
   return 0;

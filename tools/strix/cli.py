@@ -11,6 +11,7 @@ import typer
 
 from strix.calibrate.cli import calibrate_app
 from strix.command import says_what_is_wrong
+from strix.identify.cli import identify_app
 from strix.log import cli_view
 from strix.log.cli import log_app
 
@@ -24,6 +25,7 @@ app = typer.Typer(
 
 app.add_typer(log_app, name="log")
 app.add_typer(calibrate_app, name="calibrate")
+app.add_typer(identify_app, name="identify")
 app.command(epilog="Example: strix convert out/flight.ulg -o flight.mcap")(cli_view.convert)
 
 
@@ -211,18 +213,37 @@ def wiring(
         print(path)
 
 
-@app.command(epilog="Example: strix gains --vehicle Quad5in --check")
+@app.command(epilog="Example: strix gains --vehicle UgglanQ450 --controller ugglan --check")
 @says_what_is_wrong
 def gains(
     vehicle: Annotated[str | None, typer.Option(help="One airframe; all when left out")] = None,
+    controller: Annotated[
+        str, typer.Option(help="lqr, or ugglan: state feedback with a reduced observer")
+    ] = "lqr",
     check: Annotated[
         bool, typer.Option("--check", help="Write nothing; exit with 1 if a header is out of date")
     ] = False,
+    corners: Annotated[
+        bool,
+        typer.Option("--corners", help="Also the margins when mass, inertia, thrust, lag differ"),
+    ] = False,
+    figures: Annotated[
+        Path | None, typer.Option(help="Folder for figures of steps and margins")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON")] = False,
 ) -> None:
     """Design the controller's gains from the vehicle file, into include/gains/."""
+    from strix.errors import BadInput
     from strix.gains import run_gains
+    from strix.observer_gains import run_observer_gains
 
-    if not run_gains(vehicle, check):
+    if controller not in ("lqr", "ugglan"):
+        raise BadInput(f"--controller: expected lqr or ugglan, found '{controller}'")
+    if controller == "lqr":
+        current = run_gains(vehicle, check, corners=corners, figures=figures, as_json=as_json)
+    else:
+        current = run_observer_gains(vehicle, check, figures)
+    if not current:
         raise typer.Exit(1)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from rich.console import Console
@@ -13,8 +14,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from strix.errors import BadInput
 from strix.flightlog import read_flight_log
 from strix.missions import find_mission
-from strix.plant.scenario import find_scenario
 from strix.report import write_report
+from strix.scenarios import Outcome, find_scenario, judge
 from strix.simulation import FlightPlan
 from strix.simulation import fly as simulate
 from strix.summary import Summary, summarise
@@ -23,20 +24,36 @@ from strix.vehicles import vehicle_name
 USUAL_FLIGHT_S = 60.0  # the first flight's; the bar stays full when one takes longer
 
 
+@dataclass(frozen=True)
+class Flown(Summary):
+    """The summary of a simulated flight, and whether it ended as its scenario has to."""
+
+    scenario: str
+    expected: Outcome
+    outcome: Outcome
+
+    @property
+    def as_expected(self) -> bool:
+        return self.outcome is self.expected
+
+    def sentence(self) -> str:
+        """What the exit code says."""
+        found = "as expected" if self.as_expected else f"expected: {self.expected}"
+        return f"{self.scenario}: {self.outcome}, {found}"
+
+
 def make_plan(
-    vehicle: str, mission: str, scenario: str, heading_deg: float, seed: int
+    vehicle: str, mission: str | None, scenario: str, heading_deg: float, seed: int
 ) -> FlightPlan:
-    """Checks what the user asked for."""
+    """Checks what the user asked for; without a mission the scenario's own is flown."""
     if not math.isfinite(heading_deg):
         raise BadInput(f"--heading: expected degrees, found {heading_deg}")
-    try:
-        found = find_scenario(scenario)
-    except ValueError as error:
-        raise BadInput(f"--scenario: {error}") from None
-    return FlightPlan(vehicle_name(vehicle), find_mission(mission), found, heading_deg, seed)
+    found = find_scenario(scenario)
+    name = mission or found.mission
+    return FlightPlan(vehicle_name(vehicle), find_mission(name), found, heading_deg, seed)
 
 
-def fly_and_report(plan: FlightPlan, out: Path) -> Summary:
+def fly_and_report(plan: FlightPlan, out: Path) -> Flown:
     """Flies the plan; leaves flight.ulg, report.html and summary.json in `out`."""
     make_writable(out)
     begin = time.monotonic()
@@ -62,7 +79,13 @@ def fly_and_report(plan: FlightPlan, out: Path) -> Summary:
 
         track = simulate(plan, log_path, show)
     log = read_flight_log(log_path)
-    summary = summarise(log, track, time.monotonic() - begin)
+    numbers = summarise(log, track, time.monotonic() - begin)
+    summary = Flown(
+        **asdict(numbers),
+        scenario=plan.scenario.name,
+        expected=plan.scenario.expected,
+        outcome=judge(log, track, numbers),
+    )
     write_report(out / "report.html", log, track, summary)
     text = json.dumps(summary.to_dict(), indent=2) + "\n"
     (out / "summary.json").write_text(text, encoding="utf-8")

@@ -108,19 +108,27 @@ def replay(
 
 
 def read_gains(path: Path) -> list[list[float]]:
-    """The numbers of a gain header, four rows of twelve."""
+    """The flown design of a gain header, its first: four rows of twelve gains, that of the lag and
+    that of the integral.
+    """
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise BadInput(f"{path}: expected a gain header, found: {error.strerror}") from None
-    body = text[text.find("{{") :]
-    numbers = [float(n) for n in re.findall(r"[-+]?\d+\.\d*(?:e[-+]?\d+)?(?=F)", body)]
-    if len(numbers) != GAIN_ROWS * GAIN_COLUMNS:
+    first = re.search(r"constexpr Gains \w+\{(.*?)\};", text, re.DOTALL)
+    body = "" if first is None else first[1]
+    numbers = [float(n) for n in re.findall(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?(?=F)", body)]
+    per_row = GAIN_COLUMNS + 2
+    if len(numbers) != GAIN_ROWS * per_row:
         raise BadInput(
-            f"{path}: expected {GAIN_ROWS} rows of {GAIN_COLUMNS} gains, "
-            f"found {len(numbers)} numbers"
+            f"{path}: expected {GAIN_ROWS} rows of {GAIN_COLUMNS} gains, of the lag and of the "
+            f"integrals, {GAIN_ROWS * per_row} numbers, found {len(numbers)}"
         )
-    return [numbers[i : i + GAIN_COLUMNS] for i in range(0, len(numbers), GAIN_COLUMNS)]
+    lag, integral = numbers[-2 * GAIN_ROWS : -GAIN_ROWS], numbers[-GAIN_ROWS:]
+    return [
+        [*numbers[GAIN_COLUMNS * row : GAIN_COLUMNS * (row + 1)], lag[row], integral[row]]
+        for row in range(GAIN_ROWS)
+    ]
 
 
 def _set(navigation: _core.NavigationConfig, change: str) -> None:

@@ -12,8 +12,8 @@ from strix.missions import Mission
 from strix.plant.earth import MAGNETIC_DECLINATION_RAD
 from strix.plant.frames import Matrix
 from strix.plant.plant import Plant
-from strix.plant.scenario import Scenario
 from strix.plant.sensors import DEFAULT_CONSTANTS, Samples, SensorConstants, SensorSuite
+from strix.scenarios import Scenario, configure
 from strix.track import TruthRecorder, TruthTrack
 from strix.vehicles import plant_numbers
 
@@ -28,6 +28,8 @@ GIVE_UP_S = 180.0
 # How the simulated magnetometer is built in; include/FlightConfig.h must undo it. The rows are its
 # axes in the body: forward, left, down. Left-handed, as the LIS2MDL's are.
 MAG_MOUNTING: Matrix = ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
+
+_NOT_TOLD = (math.nan,) * 4  # temperature and current: those ESCs do not measure them
 
 Progress = Callable[[float, str], None]  # time s, state name
 
@@ -61,7 +63,7 @@ class Pilot:
                 self._arm_since_s = time_s
             return self._arm_since_s is not None, False
         waited_s = time_s - self._arm_since_s
-        if state in ("TAKEOFF", "HOLD", "WAYPOINT", "LAND"):
+        if motors_on and state not in ("IDLE", "ARMED"):
             self._flew = True
         if not motors_on and (self._flew or waited_s > 0.5):  # landed or cut off, or refused
             self._arm_since_s = None
@@ -77,20 +79,23 @@ def fly(
 ) -> TruthTrack:
     """Flies until the aircraft has landed, or gives up; the log is what the card would hold."""
     mission = plan.mission
-    plant = Plant(
-        plant_numbers(plan.vehicle), plan.scenario, math.radians(plan.heading_deg), plan.seed
+    scenario = plan.scenario
+    vehicle = scenario.variation.applied_to(plant_numbers(plan.vehicle))
+    plant = Plant(vehicle, scenario.surroundings, math.radians(plan.heading_deg), plan.seed)
+    sensors = SensorSuite(
+        scenario.surroundings, plan.seed, plan.sensors, MAG_MOUNTING, vehicle.escs_answer
     )
-    sensors = SensorSuite(plan.scenario, plan.seed, plan.sensors, MAG_MOUNTING)
+    options = _core.FlightOptions(plan.vehicle)
+    configure(options, scenario.settings)
     flight = _core.Flight(
         vehicle=plan.vehicle,
         mission=mission.name,
-        takeoff_height_m=mission.takeoff_height_m,
-        takeoff_hold_s=mission.takeoff_hold_s,
-        legs=list(mission.legs),
+        mission_text=mission.text,
         declination_rad=MAGNETIC_DECLINATION_RAD,
         log_path=str(log_path),
         boot_id=plan.seed,
         start_time_us=plant.truth.time_us,
+        options=options,
     )
     pilot = Pilot(plan.arm_at_s)
     recorder = TruthRecorder()
@@ -136,3 +141,7 @@ def _deliver(flight: _core.Flight, samples: Samples) -> None:
             gps.fix,
             gps.satellites,
         )
+    if (battery := samples.battery) is not None:
+        flight.put_battery(battery.sampled_us, battery.voltage_v, battery.current_a)
+    if (esc := samples.esc) is not None:
+        flight.put_esc_status(esc.sampled_us, esc.rev_s, esc.voltage_v, _NOT_TOLD, _NOT_TOLD)

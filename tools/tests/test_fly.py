@@ -15,10 +15,8 @@ from pyulog import ULog
 from typer.testing import CliRunner
 
 from strix.cli import app
-from strix.errors import BadInput
 from strix.flightlog import FlightLog, read_flight_log
 from strix.fly import make_plan
-from strix.missions import find_mission
 from strix.plant.sensors import DEFAULT_CONSTANTS
 from strix.simulation import FlightPlan, fly
 from strix.summary import Summary, summarise
@@ -220,7 +218,11 @@ def test_fly_leaves_its_three_files_and_the_summary(tmp_path: Path) -> None:
         "rms_tracking_m",
         "log_drops",
         "loop_overruns",
+        "scenario",
+        "expected",
+        "outcome",
     }
+    assert printed["outcome"] == printed["expected"] == "lands"
     assert json.loads((out / "summary.json").read_text(encoding="utf-8")) == printed
     assert (out / "flight.ulg").stat().st_size > 1_000_000
     assert "<html" in (out / "report.html").read_text(encoding="utf-8")
@@ -230,7 +232,7 @@ def test_fly_leaves_its_three_files_and_the_summary(tmp_path: Path) -> None:
     ("arguments", "told"),
     [
         (["--vehicle", "Quad6in"], "expected one of Quad5in, UgglanQ450, found 'Quad6in'"),
-        (["--mission", "nowhere"], "expected a file or one of first-flight, found 'nowhere'"),
+        (["--mission", "nowhere"], "expected a file or one of first-flight, "),
         (["--scenario", "storm"], "unknown scenario 'storm'"),
         (["--heading", "nan"], "--heading: expected degrees"),
     ],
@@ -253,32 +255,12 @@ def test_an_out_folder_that_cannot_be_written_is_told_in_one_line(tmp_path: Path
     assert result.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("leg 1 2 3 0 1\n", "expected a line 'takeoff HEIGHT_M HOLD_S', found none"),
-        ("takeoff 2\n", "line 1: expected 'takeoff HEIGHT_M HOLD_S', found 1 numbers"),
-        ("takeoff 2 1\nleg 1 2 x 0 1\n", "line 2, HEIGHT_M: expected a number, found 'x'"),
-        ("takeoff 2 1\nleg 1 2 nan 0 1\n", "line 2, HEIGHT_M: expected a number, found 'nan'"),
-        ("takeoff 2 -1\n", "line 1, HOLD_S: expected 0 to 3600 s, found '-1'"),
-        ("takeoff 2 1\nfly 1\n", "line 2: expected 'takeoff' or 'leg', found 'fly'"),
-        ("takeoff 2 1\n" + "leg 1 1 1 0 0\n" * 17, "expected at most 16 legs, found 17"),
-    ],
-)
-def test_a_wrong_mission_file_is_told_with_its_line(text: str, told: str, tmp_path: Path) -> None:
-    path = tmp_path / "mission.txt"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(BadInput) as caught:
-        find_mission(str(path))
-    assert str(caught.value).startswith(str(path))
-    assert told in str(caught.value)
-
-
-def test_a_mission_outside_the_fence_is_never_armed(tmp_path: Path) -> None:
-    mission = tmp_path / "far.txt"
-    mission.write_text("takeoff 2 1\nleg 100 0 2 0 1\n", encoding="utf-8")
-    plan = make_plan("Quad5in", str(mission), "calm", 0.0, seed=1)
-    track = fly(plan, tmp_path / "far.ulg", lambda _time_s, _state: None, give_up_s=25.0)
-    log = read_flight_log(tmp_path / "far.ulg")
-    assert any("leaves the fence" in message.text for message in log.messages)
-    assert track.on_ground.all()
+def test_a_wrong_mission_file_is_told_with_its_line(tmp_path: Path) -> None:
+    mission = tmp_path / "mission.txt"  # what else can be wrong in one: test_missions.py
+    mission.write_text("takeoff 2 1\nleg 1 2 x 0 1\n", encoding="utf-8")
+    result = CliRunner().invoke(
+        app, ["fly", "--mission", str(mission), "--out", str(tmp_path / "out")]
+    )
+    assert result.exit_code == 2
+    assert f"{mission}, line 2, HEIGHT_M" in result.stderr
+    assert result.stderr.count("\n") == 1

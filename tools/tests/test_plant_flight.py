@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from test_plant_vehicle import QUAD5IN, VEHICLES
 
-from strix.plant import SCENARIOS, Plant, Rotor, Truth, VehicleNumbers
+from strix.plant import Plant, Rotor, Surroundings, Truth, VehicleNumbers
 from strix.plant.frames import level_at_heading, rotate_to_body, rotate_to_world
 
 G = 9.80665
-CALM = SCENARIOS["calm"]
+CALM = Surroundings()
 OFF = (-1e9,) * 4
 ALOFT = (0.0, 0.0, -100.0)
 

@@ -7,11 +7,11 @@ import pytest
 from test_plant_flight import OFF, commands_for, fly
 from test_plant_vehicle import QUAD5IN, VEHICLES
 
-from strix.plant import SCENARIOS, Plant, VehicleNumbers
+from strix.plant import Plant, Surroundings, VehicleNumbers
 from strix.plant.frames import level_at_heading, rotate_to_world
 
 G = 9.80665
-CALM = SCENARIOS["calm"]
+CALM = Surroundings()
 
 
 @VEHICLES
@@ -94,8 +94,8 @@ def test_a_standing_vehicle_does_not_creep_in_a_fresh_breeze() -> None:
 def test_friction_holds_a_push_below_its_cone_and_yields_above() -> None:
     # The rotors carry half the weight, at sqrt(1/2) of their hover speed, and drag with the wind.
     def slip_m(wind_m_s: float) -> float:
-        scenario = replace(CALM, wind_mean_ned_m_s=(wind_m_s, 0.0, 0.0))
-        plant = Plant(QUAD5IN, scenario, 0.0, seed=0)
+        wind = replace(CALM, wind_mean_ned_m_s=(wind_m_s, 0.0, 0.0))
+        plant = Plant(QUAD5IN, wind, 0.0, seed=0)
         commands = commands_for(QUAD5IN, (math.sqrt(0.5),) * 4)
         return fly(plant, commands, 2000).position_ned_m[0]
 

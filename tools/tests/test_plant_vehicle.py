@@ -1,36 +1,36 @@
-"""Vehicle numbers: reading the mapping, the command curve, and the two layouts of DESIGN.md.
+"""Vehicle numbers: the command curve, and the two layouts of DESIGN.md.
 
 QUAD5IN and UGGLAN_Q450 are fixtures: in a flight the numbers come from the flight code's headers.
 """
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from strix.plant import Rotor, VehicleNumbers
 
-QUAD5IN_MAPPING: dict[str, Any] = {
-    "name": "Quad5in",
-    "mass_kg": 0.83,
-    "inertia_kg_m2": [0.003, 0.004, 0.005],
-    "rotors": [  # front left, front right, rear right, rear left; tau_z row of DESIGN.md: - + - +
-        {"x_m": 0.08, "y_m": -0.08, "spin": 1},
-        {"x_m": 0.08, "y_m": 0.08, "spin": -1},
-        {"x_m": -0.08, "y_m": 0.08, "spin": 1},
-        {"x_m": -0.08, "y_m": -0.08, "spin": -1},
-    ],
-    "thrust_constant": 6.583e-5,
-    "torque_constant": 7.51e-7,
-    "speed_unit": "rev/s",
-    "motor_time_constant_s": 0.04,
-    "command_offset": 1195.0,
-    "command_linear": 0.0,
-    "command_quadratic": 755.0 / 160000.0,
-    "command_min": 1150.0,
-    "command_max": 1950.0,
-}
-QUAD5IN = VehicleNumbers.from_mapping(QUAD5IN_MAPPING)
+QUAD5IN = VehicleNumbers(
+    name="Quad5in",
+    mass_kg=0.83,
+    inertia_kg_m2=(0.003, 0.004, 0.005),
+    rotors=(  # front left, front right, rear right, rear left; tau_z row of DESIGN.md: - + - +
+        Rotor(0.08, -0.08, 1),
+        Rotor(0.08, 0.08, -1),
+        Rotor(-0.08, 0.08, 1),
+        Rotor(-0.08, -0.08, -1),
+    ),
+    thrust_constant=6.583e-5,
+    torque_constant=7.51e-7,
+    speed_unit="rev/s",
+    motor_time_constant_s=0.04,
+    command_offset=1195.0,
+    command_linear=0.0,
+    command_quadratic=755.0 / 160000.0,
+    command_min=1150.0,
+    command_max=1950.0,
+)
 
 UGGLAN_Q450 = VehicleNumbers(
     name="UgglanQ450",
@@ -56,36 +56,13 @@ UGGLAN_Q450 = VehicleNumbers(
 VEHICLES = pytest.mark.parametrize("vehicle", [QUAD5IN, UGGLAN_Q450], ids=lambda v: v.name)
 
 
-def test_the_mapping_is_read_field_by_field() -> None:
-    assert QUAD5IN.rotors[3] == Rotor(x_m=-0.08, y_m=-0.08, spin=-1)
-    assert QUAD5IN.inertia_kg_m2 == (0.003, 0.004, 0.005)
-    assert QUAD5IN.command_quadratic == 755.0 / 160000.0
-    assert QUAD5IN.rotor_inertia_kg_m2 == 0.0
-    heavy = VehicleNumbers.from_mapping({**QUAD5IN_MAPPING, "rotor_inertia_kg_m2": 1e-5})
-    assert heavy.rotor_inertia_kg_m2 == 1e-5
-
-
-@pytest.mark.parametrize("key", sorted(QUAD5IN_MAPPING))
-def test_a_missing_key_is_named(key: str) -> None:
-    mapping = {k: v for k, v in QUAD5IN_MAPPING.items() if k != key}
-    with pytest.raises(ValueError, match=f"'{key}' is missing"):
-        VehicleNumbers.from_mapping(mapping)
-
-
-def test_a_missing_key_of_a_rotor_is_named_with_its_motor() -> None:
-    rotors = [dict(rotor) for rotor in QUAD5IN_MAPPING["rotors"]]
-    del rotors[2]["spin"]
-    with pytest.raises(ValueError, match="Quad5in, rotor M3: key 'spin' is missing"):
-        VehicleNumbers.from_mapping({**QUAD5IN_MAPPING, "rotors": rotors})
-
-
 @pytest.mark.parametrize(
     ("key", "value", "told"),
     [
-        ("rotors", QUAD5IN_MAPPING["rotors"][:3], "4 entries, found 3"),
-        ("inertia_kg_m2", [0.003, 0.004], "3 entries, found 2"),
-        ("inertia_kg_m2", [0.003, -0.004, 0.005], "inertia_kg_m2 must be positive"),
-        ("rotors", [{"x_m": 0.1, "y_m": 0.1, "spin": 0}] * 4, "spin is"),
+        ("rotors", QUAD5IN.rotors[:3], "4 rotors expected, found 3"),
+        ("inertia_kg_m2", (0.003, -0.004, 0.005), "inertia_kg_m2 must be positive"),
+        ("rotors", (Rotor(0.1, 0.1, 0),) * 4, "spin is"),
+        ("rotors", (Rotor(0.1, 0.1, 1, strength=0.0),) * 4, "strength of a rotor must be positive"),
         ("mass_kg", 0.0, "mass_kg must be positive"),
         ("motor_time_constant_s", math.nan, "motor_time_constant_s must be positive"),
         ("speed_unit", "rpm", "found 'rpm'"),
@@ -94,7 +71,7 @@ def test_a_missing_key_of_a_rotor_is_named_with_its_motor() -> None:
 )
 def test_an_impossible_vehicle_is_refused(key: str, value: Any, told: str) -> None:
     with pytest.raises(ValueError, match=told):
-        VehicleNumbers.from_mapping({**QUAD5IN_MAPPING, key: value})
+        replace(QUAD5IN, **{key: value})
 
 
 def test_quad5in_turns_400_times_a_second_at_full_command() -> None:
@@ -131,3 +108,11 @@ def test_a_command_beyond_the_limit_gives_the_limits_speed(vehicle: VehicleNumbe
     top = vehicle.speed_for_command(vehicle.command_max)
     assert vehicle.speed_for_command(vehicle.command_max + 100.0) == top
     assert vehicle.speed_for_command(math.inf) == top
+
+
+def test_an_esc_stops_its_motor_below_the_slowest_speed_it_can_keep() -> None:
+    # DESIGN.md section 5: the UgglanQ450's command is zero below 200 rad/s, which is 1725.
+    vehicle = replace(UGGLAN_Q450, speed_min=200.0)
+    assert vehicle.speed_for_command(1725.0) == pytest.approx(200.0)
+    assert vehicle.speed_for_command(1724.0) == 0.0
+    assert UGGLAN_Q450.speed_for_command(1724.0) == pytest.approx(200.0, abs=0.02)

@@ -9,13 +9,14 @@ import pytest
 from scipy.stats import chi2
 from test_plant_vehicle import QUAD5IN
 
-from strix.plant import SCENARIOS, Plant, SensorConstants, SensorSuite, Truth
+from strix.plant import Plant, SensorConstants, SensorSuite, Surroundings, Truth
 from strix.plant.earth import MAGNETIC_DECLINATION_RAD, pressure_pa
 from strix.plant.frames import IDENTITY, Matrix, level_at_heading
 from strix.plant.sensors import Samples
 
 G = 9.80665
-CALM = SCENARIOS["calm"]
+CALM = Surroundings()
+MAGNETIC = Surroundings(motor_field_at_hover_ut=(3.0, -2.0, 3.5))
 AT_REST = Plant(QUAD5IN, CALM, 0.0, seed=0).truth
 SPECIFIED = SensorConstants()
 # What the devices would say without noise, bias and steps: for tests of everything else.
@@ -295,9 +296,12 @@ def test_the_imu_saturates_at_its_range() -> None:
 
 
 def field_facing(
-    heading_rad: float, mounting: Matrix = IDENTITY, scenario: str = "calm", load: float = 0.0
+    heading_rad: float,
+    mounting: Matrix = IDENTITY,
+    surroundings: Surroundings = CALM,
+    load: float = 0.0,
 ) -> tuple[float, float, float]:
-    suite = SensorSuite(SCENARIOS[scenario], 0, EXACT, mounting)
+    suite = SensorSuite(surroundings, 0, EXACT, mounting)
     truth = replace(AT_REST, q_body_to_ned=level_at_heading(heading_rad), thrust_to_weight=load)
     for time_us in range(0, 14_000, 1000):
         mag = suite.sample(replace(truth, time_us=time_us)).mag
@@ -324,8 +328,8 @@ def test_the_mounting_turns_the_field_into_the_sensors_axes() -> None:
 def test_motor_currents_disturb_the_field_with_the_thrust_and_only_if_asked() -> None:
     clean = np.array(field_facing(1.0))
     np.testing.assert_allclose(field_facing(1.0, load=1.5), clean, atol=1e-8)
-    np.testing.assert_allclose(field_facing(1.0, scenario="magnetic"), clean, atol=1e-8)
-    disturbed = np.array(field_facing(1.0, scenario="magnetic", load=1.5))
+    np.testing.assert_allclose(field_facing(1.0, surroundings=MAGNETIC), clean, atol=1e-8)
+    disturbed = np.array(field_facing(1.0, surroundings=MAGNETIC, load=1.5))
     np.testing.assert_allclose(disturbed - clean, 1.5 * np.array([3.0, -2.0, 3.5]), atol=1e-8)
 
 

@@ -129,9 +129,16 @@ class Cursor {
   if (airframe == nullptr) {
     log.refuse("a vehicle of include/vehicles", "'" + log.info("vehicle") + "'");
   }
+  const topic::FlightConfig& chosen = loggedConfig(log);
+  if (chosen.design >= airframe->designs.size() ||
+      (chosen.attitude_law != 0 && airframe->observer == nullptr)) {
+    log.refuse("a controller of include/gains", "one of another version");
+  }
   FlightSoftwareConfig config =
-      flightConfig(airframe->vehicle, gains == nullptr ? airframe->gains : *gains, mission,
-                   loggedConfig(log).declination);
+      flightConfig(airframe->vehicle, gains == nullptr ? *airframe->designs[chosen.design] : *gains,
+                   mission, chosen.declination);
+  config.design = chosen.design;
+  if (chosen.attitude_law != 0) config.control.reducedObserver = airframe->observer;
   const bool real = log.info("ver_hw") != SimulatedBoard<>::kName;
   if (real) useRealSensors(config.sensors, kCalibration);
   return config;

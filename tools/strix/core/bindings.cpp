@@ -7,6 +7,9 @@ NB_MODULE(_core, m) {
   bindConsistency(m);  // of whose types it speaks
   bindFilters(m);
   bindFlight(m);
+  bindMissions(m);
+  bindMotors(m);
   bindReplay(m);
+  bindUgglanFlight(m);
   bindVehicles(m);
 }

@@ -3,9 +3,9 @@
 
 #include <FlightConfig.h>
 #include <FlightSoftware.h>
+#include <MissionText.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
 
 #include <array>
 #include <cerrno>
@@ -25,46 +25,68 @@ using Array4 = std::array<float, 4>;
 
 strix::Vector3f toVector(const Array3& v) { return {v[0], v[1], v[2]}; }
 
-/// north m, east m, height m, turn rad, hold s
-using LegRow = std::array<float, 5>;
-
-strix::Micros toMicros(float seconds) { return static_cast<strix::Micros>(seconds * 1e6F); }
-
-strix::Mission makeMission(const std::string& name, float takeoffHeight, float takeoffHold,
-                           const std::vector<LegRow>& legs) {
-  if (legs.size() > strix::Mission::kMaxLegs) {
-    throw std::invalid_argument("a mission has at most " +
-                                std::to_string(strix::Mission::kMaxLegs) + " legs");
-  }
-  strix::Mission mission{name.c_str(),
-                         takeoffHeight,
-                         toMicros(takeoffHold),
-                         static_cast<std::uint8_t>(legs.size()),
-                         {}};
-  for (std::size_t i = 0; i < legs.size(); ++i) {
-    mission.legs[i] = {legs[i][0], legs[i][1], legs[i][2], legs[i][3], toMicros(legs[i][4])};
-  }
-  return mission;
-}
-
 const strix::Airframe& airframe(const std::string& name) {
   const strix::Airframe* found = strix::findAirframe(name);
   if (found == nullptr) throw std::invalid_argument("unknown vehicle '" + name + "'");
   return *found;
 }
 
+/// @param name  lives as long as the mission
+strix::Mission readMission(const std::string& name, const std::string& text) {
+  const strix::ParsedMission parsed = strix::parseMission(name.c_str(), text);
+  if (!parsed.valid()) {
+    throw std::invalid_argument(name + ": " + strix::MissionErrorText(parsed.error).text());
+  }
+  return parsed.mission;
+}
+
+/// What a flight may have other than the aircraft's own configuration has.
+struct FlightOptions {
+  explicit FlightOptions(const std::string& vehicle)
+      : FlightOptions(strix::flightConfig(airframe(vehicle).vehicle, airframe(vehicle).gains,
+                                          strix::kFirstFlight, 0.0F)) {}
+  explicit FlightOptions(const strix::FlightSoftwareConfig& config)
+      : navigation(config.navigation), control(config.control), guidance(config.guidance) {}
+
+  strix::NavigationConfig navigation;
+  strix::ControlConfig control;
+  strix::GuidanceConfig guidance;
+  std::size_t design = 0;        ///< of Airframe::designs
+  bool reducedObserver = false;  ///< attitude by Ugglan's law
+};
+
+strix::FlightSoftwareConfig configured(const std::string& vehicle, const strix::Mission& mission,
+                                       float declination, const FlightOptions* options) {
+  const strix::Airframe& frame = airframe(vehicle);
+  if (options == nullptr) {
+    return strix::flightConfig(frame.vehicle, frame.gains, mission, declination);
+  }
+  if (options->design >= frame.designs.size()) throw std::invalid_argument("no such design");
+  strix::FlightSoftwareConfig config =
+      strix::flightConfig(frame.vehicle, *frame.designs[options->design], mission, declination);
+  config.design = static_cast<std::uint8_t>(options->design);
+  config.navigation = options->navigation;
+  config.control = options->control;
+  config.guidance = options->guidance;
+  if (options->reducedObserver) {
+    if (frame.observer == nullptr) {
+      throw std::invalid_argument(vehicle + " has no gains of the reduced observer");
+    }
+    config.control.reducedObserver = frame.observer;
+  }
+  return config;
+}
+
 /// One power-up of the aircraft, from setup() to power-off.
 class Flight {
  public:
-  Flight(const std::string& vehicle, const std::string& missionName, float takeoffHeight,
-         float takeoffHold, const std::vector<LegRow>& legs, float declination,
-         const std::string& logPath, std::uint32_t bootId, strix::Micros startTime)
+  Flight(const std::string& vehicle, const std::string& missionName, const std::string& missionText,
+         float declination, const std::string& logPath, std::uint32_t bootId,
+         strix::Micros startTime, const FlightOptions* options)
       : missionName_(missionName),
         board_(logPath, bootId),
-        software_(board_,
-                  strix::flightConfig(airframe(vehicle).vehicle, airframe(vehicle).gains,
-                                      makeMission(missionName_, takeoffHeight, takeoffHold, legs),
-                                      declination)) {
+        software_(board_, configured(vehicle, readMission(missionName_, missionText), declination,
+                                     options)) {
     if (!board_.card().open()) {
       throw std::invalid_argument(logPath + ": cannot be written: " + std::strerror(errno));
     }
@@ -127,14 +149,66 @@ class Flight {
 
 }  // namespace
 
+void bindOptions(nb::module_& m) {
+  using strix::ControlConfig;
+  using strix::GuidanceConfig;
+  using strix::ReferenceFilterConfig;
+  using strix::TrajectoryLimits;
+
+  nb::class_<ReferenceFilterConfig>(m, "ReferenceFilterConfig", "Time constants in s, 0: off")
+      .def_rw("position", &ReferenceFilterConfig::position)
+      .def_rw("yaw", &ReferenceFilterConfig::yaw)
+      .def_rw("tilt", &ReferenceFilterConfig::tilt);
+  nb::class_<ControlConfig>(m, "ControlConfig", "Limits of the controller and its filters")
+      .def_rw("referenceFilter", &ControlConfig::referenceFilter)
+      .def_rw("positionHorizontal", &ControlConfig::positionHorizontal)
+      .def_rw("positionVertical", &ControlConfig::positionVertical)
+      .def_rw("velocityHorizontal", &ControlConfig::velocityHorizontal)
+      .def_rw("velocityVertical", &ControlConfig::velocityVertical)
+      .def_rw("acceleration", &ControlConfig::acceleration)
+      .def_rw("yaw", &ControlConfig::yaw)
+      .def_rw("tilt", &ControlConfig::tilt)
+      .def_rw("attitudeTilt", &ControlConfig::attitudeTilt)
+      .def_rw("rollPitchRate", &ControlConfig::rollPitchRate)
+      .def_rw("yawRate", &ControlConfig::yawRate)
+      .def_rw("integralTilt", &ControlConfig::integralTilt)
+      .def_rw("integralThrust", &ControlConfig::integralThrust)
+      .def_rw("integralYaw", &ControlConfig::integralYaw);
+  nb::class_<TrajectoryLimits>(m, "TrajectoryLimits", "Of the way from place to place")
+      .def_rw("speedHorizontal", &TrajectoryLimits::speedHorizontal)
+      .def_rw("speedVertical", &TrajectoryLimits::speedVertical)
+      .def_rw("acceleration", &TrajectoryLimits::acceleration)
+      .def_rw("jerk", &TrajectoryLimits::jerk)
+      .def_rw("yawRate", &TrajectoryLimits::yawRate)
+      .def_rw("yawAcceleration", &TrajectoryLimits::yawAcceleration)
+      .def_rw("yawJerk", &TrajectoryLimits::yawJerk);
+  nb::class_<GuidanceConfig>(m, "GuidanceConfig", "How the aircraft gets to its references")
+      .def_rw("trajectory", &GuidanceConfig::trajectory)
+      .def_rw("arrivalRadius", &GuidanceConfig::arrivalRadius)
+      .def_rw("arrivalSpeed", &GuidanceConfig::arrivalSpeed)
+      .def_rw("arrivalYaw", &GuidanceConfig::arrivalYaw)
+      .def_rw("returnHeight", &GuidanceConfig::returnHeight)
+      .def_rw("standThrust", &GuidanceConfig::standThrust);
+  nb::class_<FlightOptions>(m, "FlightOptions",
+                            "Another tuning of one flight; starts as the vehicle flies")
+      .def(nb::init<const std::string&>(), "vehicle"_a)
+      .def_rw("navigation", &FlightOptions::navigation)
+      .def_rw("control", &FlightOptions::control)
+      .def_rw("guidance", &FlightOptions::guidance)
+      .def_rw("design", &FlightOptions::design,
+              "Of the gains: 0 integral and lag, 1 no integral, 2 no lag, 3 neither")
+      .def_rw("reduced_observer", &FlightOptions::reducedObserver,
+              "Attitude by Ugglan's law, where the vehicle has its gains");
+}
+
 void bindFlight(nb::module_& m) {
+  bindOptions(m);
   nb::class_<Flight>(m, "Flight",
                      "The flight software on a simulated board. Times are Micros (uint32, us).")
-      .def(
-          nb::init<const std::string&, const std::string&, float, float, const std::vector<LegRow>&,
-                   float, const std::string&, std::uint32_t, strix::Micros>(),
-          "vehicle"_a, "mission"_a, "takeoff_height_m"_a, "takeoff_hold_s"_a, "legs"_a,
-          "declination_rad"_a, "log_path"_a, "boot_id"_a, "start_time_us"_a)
+      .def(nb::init<const std::string&, const std::string&, const std::string&, float,
+                    const std::string&, std::uint32_t, strix::Micros, const FlightOptions*>(),
+           "vehicle"_a, "mission"_a, "mission_text"_a, "declination_rad"_a, "log_path"_a,
+           "boot_id"_a, "start_time_us"_a, "options"_a.none() = nb::none())
       .def("set_switches", &Flight::setSwitches, "arm"_a, "start"_a, "kill"_a)
       .def("put_imu", &Flight::putImu, "sampled_us"_a, "accel_m_s2"_a, "gyro_rad_s"_a,
            "temperature_degc"_a)

@@ -5,6 +5,8 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
+#include <algorithm>
+
 #include "bind.h"
 
 namespace nb = nanobind;
@@ -25,14 +27,25 @@ strix::ReplayResult run(const FlightLogReader& log, const strix::FlightSoftwareC
   return result;
 }
 
-using GainRows = std::array<std::array<float, strix::kErrorCount>, strix::kControlCount>;
+/// Of each control: the gains on the errors, on the lagging wrench, on the integral.
+using GainRows = std::array<std::array<float, strix::kErrorCount + 2>, strix::kControlCount>;
+
+strix::Gains gainsOf(const GainRows& rows) {
+  strix::Gains gains{"replayed", {}};
+  for (std::size_t row = 0; row < rows.size(); ++row) {
+    std::copy_n(rows[row].begin(), strix::kErrorCount, gains.k[row].begin());
+    gains.lag[row] = rows[row][strix::kErrorCount];
+    gains.integral[row] = rows[row][strix::kErrorCount + 1];
+  }
+  return gains;
+}
 
 strix::ReplayResult replay(const FlightLogReader& log,
                            const std::optional<strix::NavigationConfig>& navigation, int states,
                            const std::optional<GainRows>& gains, const std::string& out,
                            bool compare) {
   std::optional<strix::Gains> other;
-  if (gains) other = strix::Gains{"replayed", *gains};
+  if (gains) other = gainsOf(*gains);
   strix::FlightSoftwareConfig config = strix::replayConfig(log, other ? &*other : nullptr);
   if (navigation) config.navigation = *navigation;
   const nb::gil_scoped_release unlocked;

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from strix.plant.battery import ELECTRONICS_W, MOTOR_EFFICIENCY, Battery
 from strix.plant.frames import (
     ZERO,
     Quaternion,
@@ -18,8 +19,8 @@ from strix.plant.frames import (
     rotate_to_body,
 )
 from strix.plant.noise import normal_stream
-from strix.plant.rigid_body import MAX_STEP_US, RigidBody
-from strix.plant.scenario import Scenario
+from strix.plant.rigid_body import MAX_STEP_US, GimballedBody, RigidBody
+from strix.plant.surroundings import Surroundings
 from strix.plant.vehicle import STANDARD_GRAVITY_M_S2, VehicleNumbers
 from strix.plant.wind import Wind
 
@@ -40,32 +41,62 @@ class Truth:
     """What is so, at one instant. Frames: NED from the place of rest at the start, body FRD."""
 
     time_us: int
-    position_ned_m: Vector  # of the centre of mass, where the IMU is
+    position_ned_m: Vector  # of the frame's centre, where the IMU is
     velocity_ned_m_s: Vector
     q_body_to_ned: Quaternion
     rate_body_rad_s: Vector
     specific_force_body_m_s2: Vector  # mean over the last step; at rest, level: [0 0 -g]
     rotor_speed: tuple[float, float, float, float]  # M1..M4, in the vehicle's speed unit
+    rotor_turns: tuple[float, float, float, float]  # M1..M4, since power-up
     on_ground: bool
     wind_ned_m_s: Vector
     thrust_to_weight: float
+    battery_v: float
+    battery_a: float  # 0 without a battery
 
 
 class Plant:
-    """Starts at rest on the ground, motors off, facing heading_rad, at time 0."""
+    """Starts at rest on the ground or the stand, motors off, facing heading_rad, at time 0."""
 
     def __init__(
-        self, vehicle: VehicleNumbers, scenario: Scenario, heading_rad: float, seed: int
+        self, vehicle: VehicleNumbers, surroundings: Surroundings, heading_rad: float, seed: int
     ) -> None:
         self._vehicle = vehicle
-        self._body = RigidBody(vehicle, level_at_heading(heading_rad))
-        self._wind = Wind(scenario, normal_stream(seed, _WIND_STREAM))
+        self._body: RigidBody | GimballedBody
+        if surroundings.stand is None:
+            self._body = RigidBody(vehicle, level_at_heading(heading_rad))
+        else:
+            self._body = GimballedBody(vehicle, level_at_heading(heading_rad), surroundings.stand)
+        self._wind = Wind(surroundings, normal_stream(seed, _WIND_STREAM))
+        self._pushes = [
+            (round(push.at_s * 1e6), round((push.at_s + push.duration_s) * 1e6), push.torque_n_m)
+            for push in surroundings.pushes
+        ]
+        self._battery: Battery | None = None
+        if surroundings.battery is not None:
+            hover_w = self._power([vehicle.hover_speed] * 4)
+            self._battery = Battery(surroundings.battery, vehicle.battery_cells, hover_w)
         self._rotor_drag = (
             _HOVER_ROTOR_DRAG_PER_S * vehicle.mass_kg / (4.0 * vehicle.hover_speed)
         )  # N per speed_unit and m/s, one rotor
         self._momentum_per_speed = vehicle.rotor_inertia_kg_m2 * vehicle.rad_s_per_unit
+        self._turns_per_s = vehicle.rad_s_per_unit / (2.0 * math.pi)
+        # x, y, spin, thrust over n^2, torque on the body over n^2; M1..M4.
+        self._rotors = [
+            (
+                rotor.x_m,
+                rotor.y_m,
+                rotor.spin,
+                vehicle.thrust_constant * rotor.strength,
+                -rotor.spin * vehicle.torque_constant * rotor.strength,
+            )
+            for rotor in vehicle.rotors
+        ]
+        # Exact first-order lag over half a step of the usual length.
+        self._half_step = (MAX_STEP_US, self._lag(MAX_STEP_US))
         self._time_us = 0
         self._speeds = [0.0, 0.0, 0.0, 0.0]
+        self._turns = [0.0, 0.0, 0.0, 0.0]
         self._truth = self._observe((0.0, 0.0, -STANDARD_GRAVITY_M_S2))
 
     @property
@@ -98,29 +129,45 @@ class Plant:
             )
         targets = [self._vehicle.speed_for_command(command) for command in commands]
         velocity, attitude = self._body.velocity_ned_m_s, self._body.q_body_to_ned
-        left_us = duration_us
+        begin_us, left_us = self._time_us, duration_us
         while left_us > 0:
             step_us = min(left_us, MAX_STEP_US)
             self._advance(targets, step_us)
             left_us -= step_us
-        self._time_us += duration_us
-        self._truth = self._observe(self._specific_force(velocity, attitude, duration_us * 1e-6))
+            self._time_us += step_us
+        duration_s = (self._time_us - begin_us) * 1e-6
+        self._truth = self._observe(self._specific_force(velocity, attitude, duration_s))
+
+    def _lag(self, step_us: int) -> float:
+        return 1.0 - math.exp(-0.5e-6 * step_us / self._vehicle.motor_time_constant_s)
 
     def _advance(self, targets: Sequence[float], step_us: int) -> None:
         step_s = step_us * 1e-6
-        self._wind.advance(step_s)
-        # Exact first-order lag. The wrench of the step uses the speeds in its middle.
-        half = 1.0 - math.exp(-0.5 * step_s / self._vehicle.motor_time_constant_s)
+        self._wind.advance(step_s, -self._body.position_ned_m[2])
+        if self._battery is not None:
+            self._battery.advance(self._power(self._speeds), step_s)
+            # An ESC's command is a share of the battery's voltage: the speed goes with both.
+            share = self._battery.voltage_v / self._vehicle.curve_voltage_v
+            targets = [target * share for target in targets]
+        # The wrench of the step uses the speeds in its middle.
+        if self._half_step[0] != step_us:
+            self._half_step = (step_us, self._lag(step_us))
+        half = self._half_step[1]
         start = self._speeds
         middle = [n + (goal - n) * half for n, goal in zip(start, targets, strict=True)]
         end = [n + (goal - n) * half for n, goal in zip(middle, targets, strict=True)]
         spin_up_n_m = (self._rotor_momentum(end) - self._rotor_momentum(start)) / step_s
         self._speeds = end
-        self._body.advance(*self._wrench(middle, spin_up_n_m), step_us)
+        turns = self._turns_per_s * step_s
+        self._turns = [t + n * turns for t, n in zip(self._turns, middle, strict=True)]
+        force, torque = self._wrench(middle, spin_up_n_m)
+        if self._pushes:
+            torque = self._pushed(torque)
+        self._body.advance(force, torque, step_us)
 
     def _wrench(self, speeds: Sequence[float], spin_up_n_m: float) -> tuple[Vector, Vector]:
-        """Force (N) and torque about the centre of mass (N m) of rotors and air, body FRD."""
-        vehicle, body = self._vehicle, self._body
+        """Force (N) and torque about the frame's centre (N m) of rotors and air, body FRD."""
+        body = self._body
         vn, ve, vd = body.velocity_ned_m_s
         wn, we, wd = self._wind.velocity_ned_m_s
         # Velocity through the air.
@@ -134,26 +181,50 @@ class Plant:
         h = self._rotor_momentum(speeds)
         tx, ty, tz = -q * h, p * h, -spin_up_n_m
 
-        for rotor, n in zip(vehicle.rotors, speeds, strict=True):
-            x, y = rotor.x_m, rotor.y_m
-            thrust = vehicle.thrust_constant * n * n  # along -z
+        rotor_drag = self._rotor_drag
+        for (x, y, _, thrust_constant, torque_constant), n in zip(
+            self._rotors, speeds, strict=True
+        ):
+            square = n * n
+            thrust = thrust_constant * square  # along -z
             # H-force: against the hub's velocity in the rotor plane, v + omega x r.
-            hx = -self._rotor_drag * n * (u - r * y)
-            hy = -self._rotor_drag * n * (v + r * x)
+            hx = -rotor_drag * n * (u - r * y)
+            hy = -rotor_drag * n * (v + r * x)
             fx += hx
             fy += hy
             fz -= thrust
             # r x F; the air turns the body against the rotor's own spin.
             tx -= y * thrust
             ty += x * thrust
-            tz += x * hy - y * hx - rotor.spin * vehicle.torque_constant * n * n
+            tz += x * hy - y * hx + torque_constant * square
         return (fx, fy, fz), (tx, ty, tz)
+
+    def _pushed(self, torque_n_m: Vector) -> Vector:
+        """With the pushes of this moment; a push lasts whole steps."""
+        x, y, z = torque_n_m
+        for begin_us, end_us, (px, py, pz) in self._pushes:
+            if begin_us <= self._time_us < end_us:
+                x, y, z = x + px, y + py, z + pz
+        return (x, y, z)
 
     def _rotor_momentum(self, speeds: Sequence[float]) -> float:
         """Angular momentum of the spinning rotors about body z, N m s."""
-        return self._momentum_per_speed * sum(
-            rotor.spin * n for rotor, n in zip(self._vehicle.rotors, speeds, strict=True)
+        n1, n2, n3, n4 = speeds
+        (_, _, s1, *_), (_, _, s2, *_), (_, _, s3, *_), (_, _, s4, *_) = self._rotors
+        return self._momentum_per_speed * (s1 * n1 + s2 * n2 + s3 * n3 + s4 * n4)
+
+    def _power(self, speeds: Sequence[float]) -> float:
+        """What rotors at these speeds and the electronics take from the battery, W.
+
+        Without what it takes to speed a rotor up, which a slower one does not give back.
+        """
+        vehicle = self._vehicle
+        shafts_w = (
+            vehicle.torque_constant
+            * vehicle.rad_s_per_unit
+            * sum(rotor.strength * n**3 for rotor, n in zip(vehicle.rotors, speeds, strict=True))
         )
+        return shafts_w / MOTOR_EFFICIENCY + ELECTRONICS_W
 
     def _specific_force(self, velocity: Vector, attitude: Quaternion, duration_s: float) -> Vector:
         """Mean of acceleration minus gravity since then, contact included, body FRD.
@@ -172,8 +243,10 @@ class Plant:
         )
 
     def _observe(self, specific_force: Vector) -> Truth:
-        body, (n1, n2, n3, n4) = self._body, self._speeds
-        thrust = self._vehicle.thrust_constant * (n1 * n1 + n2 * n2 + n3 * n3 + n4 * n4)
+        body, (n1, n2, n3, n4), (t1, t2, t3, t4) = self._body, self._speeds, self._turns
+        (_, _, _, k1, _), (_, _, _, k2, _), (_, _, _, k3, _), (_, _, _, k4, _) = self._rotors
+        thrust = k1 * n1 * n1 + k2 * n2 * n2 + k3 * n3 * n3 + k4 * n4 * n4
+        battery = self._battery
         return Truth(
             time_us=self._time_us,
             position_ned_m=body.position_ned_m,
@@ -182,7 +255,10 @@ class Plant:
             rate_body_rad_s=body.rate_body_rad_s,
             specific_force_body_m_s2=specific_force,
             rotor_speed=(n1, n2, n3, n4),
+            rotor_turns=(t1, t2, t3, t4),
             on_ground=body.on_ground,
             wind_ned_m_s=self._wind.velocity_ned_m_s,
             thrust_to_weight=thrust / self._vehicle.weight_n,
+            battery_v=self._vehicle.curve_voltage_v if battery is None else battery.voltage_v,
+            battery_a=0.0 if battery is None else battery.current_a,
         )

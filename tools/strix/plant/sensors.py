@@ -1,4 +1,4 @@
-"""The four sensors: truth in, what their registers and sentences would say out.
+"""The sensors: truth in, what their registers and sentences would say out.
 
 Each device has its own rate, phase, delay, noise and resolution. A reading delivered at time t
 is of the truth at t - delay, and carries that time as sampled_us.
@@ -21,10 +21,11 @@ from strix.plant.earth import (
 from strix.plant.frames import IDENTITY, Matrix, Vector, rotate_to_body
 from strix.plant.noise import normal_stream
 from strix.plant.plant import Truth
-from strix.plant.scenario import Scenario
+from strix.plant.surroundings import Surroundings
 from strix.plant.vehicle import STANDARD_GRAVITY_M_S2
 
 _ACCEL_STREAM, _GYRO_STREAM, _MAG_STREAM, _BARO_STREAM, _GPS_STREAM = 1, 2, 3, 4, 5
+_BATTERY_STREAM = 6
 _KNOTS_PER_M_S = 3600.0 / 1852.0
 
 
@@ -78,6 +79,19 @@ class SensorConstants:
     gps_satellites: int = 9
     gps_hdop: float = 1.0
 
+    # Battery monitor: a divider to 3.3 V full scale at 12 bits, and a shunt; noise and steps ours.
+    battery: Device = Device(period_us=100_000, phase_us=59_000, delay_us=0)
+    battery_sigma_v: float = 0.02  # the motors' ripple, behind a capacitor
+    battery_lsb_v: float = 0.01  # 36 V / 4096, rounded up
+    battery_sigma_a: float = 0.2
+    battery_lsb_a: float = 0.03  # 120 A / 4096
+
+    # ESCs that answer, as SimonK's do over I2C: commutations since they were asked before, six for
+    # each of 7 pole pairs in a turn; voltage in steps of 5 V x 6.45 / 1024 (10 bits).
+    esc: Device = Device(period_us=200_000, phase_us=83_000, delay_us=0)
+    esc_counts_per_turn: int = 42
+    esc_lsb_v: float = 5.0 * 6.45 / 1024.0
+
 
 DEFAULT_CONSTANTS = SensorConstants()
 
@@ -118,6 +132,22 @@ class GpsSample:
 
 
 @dataclass(frozen=True, slots=True)
+class BatterySample:
+    sampled_us: int
+    voltage_v: float
+    current_a: float
+
+
+@dataclass(frozen=True, slots=True)
+class EscSample:
+    """M1..M4."""
+
+    sampled_us: int
+    rev_s: tuple[float, float, float, float]  # mean since the sample before
+    voltage_v: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class Samples:
     """What became ready since the last call."""
 
@@ -125,6 +155,8 @@ class Samples:
     mag: MagSample | None = None
     baro: BaroSample | None = None
     gps: GpsSample | None = None
+    battery: BatterySample | None = None
+    esc: EscSample | None = None
 
 
 class _Channel:
@@ -182,18 +214,23 @@ class SensorSuite:
     """Call sample() with every new truth, at least once a millisecond.
 
     mag_mounting turns body axes into the magnetometer's own: row i is the sensor's axis i. The
-    LIS2MDL's axes are left-handed, so the real matrix has determinant -1.
+    LIS2MDL's axes are left-handed, so the real matrix has determinant -1. The battery is measured
+    when the surroundings have one; escs_answer is the vehicle's.
     """
 
     def __init__(
         self,
-        scenario: Scenario,
+        surroundings: Surroundings,
         seed: int,
         constants: SensorConstants = DEFAULT_CONSTANTS,
         mag_mounting: Matrix = IDENTITY,
+        escs_answer: bool = False,
     ) -> None:
         self._constants = c = constants
-        self._motor_field_ut = scenario.motor_field_at_hover_ut
+        self._motor_field_ut = surroundings.motor_field_at_hover_ut
+        self._vibration = surroundings.vibration_at_hover_m_s2
+        self._rectified = surroundings.rectified_at_hover_m_s2
+        self._shaken = any(self._vibration) or any(self._rectified)
         self._mag_mounting = mag_mounting
 
         accel, gyro = normal_stream(seed, _ACCEL_STREAM), normal_stream(seed, _GYRO_STREAM)
@@ -228,7 +265,12 @@ class SensorSuite:
         self._baro = _Channel(baro, c.baro_sigma_pa, c.baro_lsb_pa, c.baro_range_pa)
 
         self._imu_clock, self._mag_clock = _Clock(c.imu), _Clock(c.mag)
-        self._baro_clock, self._gps_clock = _Clock(c.baro), _Clock(c.gps)
+        self._baro_clock = _Clock(c.baro)
+        self._gps_clock = None if surroundings.roof else _Clock(c.gps)
+        self._battery_clock = None if surroundings.battery is None else _Clock(c.battery)
+        self._battery_draw = normal_stream(seed, _BATTERY_STREAM)
+        self._esc_clock = _Clock(c.esc) if escs_answer else None
+        self._esc_before: Truth | None = None
         self._history: deque[Truth] = deque()
         self._longest_delay_us = max(d.delay_us for d in (c.imu, c.mag, c.baro, c.gps))
 
@@ -251,14 +293,16 @@ class SensorSuite:
             mag=None if mag is None else self._read_mag(mag),
             baro=None if baro is None else self._read_baro(baro),
             gps=None if gps is None else self._read_gps(gps),
+            battery=self._read_battery(truth),
+            esc=self._read_escs(truth),
         )
 
-    def _ready(self, device: Device, clock: _Clock, now_us: int) -> Truth | None:
+    def _ready(self, device: Device, clock: _Clock | None, now_us: int) -> Truth | None:
         """The truth a device delivers now: the last at or before now - delay.
 
         None between deliveries, and while nothing was there to be measured yet.
         """
-        if not clock.due(now_us):
+        if clock is None or not clock.due(now_us):
             return None
         wanted_us = now_us - device.delay_us
         for truth in reversed(self._history):
@@ -268,6 +312,9 @@ class SensorSuite:
 
     def _read_imu(self, truth: Truth) -> ImuSample:
         fx, fy, fz = truth.specific_force_body_m_s2
+        if self._shaken:
+            dx, dy, dz = self._motors_shake(truth)
+            fx, fy, fz = fx + dx, fy + dy, fz + dz
         p, q, r = truth.rate_body_rad_s
         ax, ay, az = self._accel
         gx, gy, gz = self._gyro
@@ -276,6 +323,18 @@ class SensorSuite:
             (ax.read(fx), ay.read(fy), az.read(fz)),
             (gx.read(p), gy.read(q), gz.read(r)),
         )
+
+    def _motors_shake(self, truth: Truth) -> Vector:
+        """What the motors add to the specific force, body FRD.
+
+        The vibration is that of the instant, so what is faster than half the sampling rate is
+        aliased, as it is in a sensor without a filter before its converter.
+        """
+        load = truth.thrust_to_weight
+        shake = 0.25 * load * sum(math.sin(2.0 * math.pi * t) for t in truth.rotor_turns)
+        vx, vy, vz = self._vibration
+        bx, by, bz = self._rectified
+        return (vx * shake + bx * load, vy * shake + by * load, vz * shake + bz * load)
 
     def _read_mag(self, truth: Truth) -> MagSample:
         earth = rotate_to_body(truth.q_body_to_ned, MAGNETIC_FIELD_NED_UT)
@@ -319,6 +378,33 @@ class SensorSuite:
             satellites=c.gps_satellites,
             hdop=c.gps_hdop,
         )
+
+    def _read_battery(self, truth: Truth) -> BatterySample | None:
+        if self._battery_clock is None or not self._battery_clock.due(truth.time_us):
+            return None
+        c, draw = self._constants, self._battery_draw
+        voltage_v = truth.battery_v + c.battery_sigma_v * draw()
+        current_a = truth.battery_a + c.battery_sigma_a * draw()
+        return BatterySample(
+            truth.time_us,
+            round(voltage_v / c.battery_lsb_v) * c.battery_lsb_v,
+            round(current_a / c.battery_lsb_a) * c.battery_lsb_a,
+        )
+
+    def _read_escs(self, truth: Truth) -> EscSample | None:
+        if self._esc_clock is None or not self._esc_clock.due(truth.time_us):
+            return None
+        before, self._esc_before = self._esc_before, truth
+        if before is None:
+            return None
+        counts = self._constants.esc_counts_per_turn
+        period_s = (truth.time_us - before.time_us) * 1e-6
+        r1, r2, r3, r4 = (
+            (int(now * counts) - int(then * counts)) / (counts * period_s)
+            for now, then in zip(truth.rotor_turns, before.rotor_turns, strict=True)
+        )
+        volts = round(truth.battery_v / self._constants.esc_lsb_v) * self._constants.esc_lsb_v
+        return EscSample(truth.time_us, (r1, r2, r3, r4), (volts, volts, volts, volts))
 
 
 def _nmea_angle(angle_deg: float) -> int:

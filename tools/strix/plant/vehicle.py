@@ -1,11 +1,12 @@
-"""The numbers of a vehicle as the plant uses them; they come from the flight code's header."""
+"""The numbers of a vehicle as the plant uses them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
+
+from strix.plant.frames import ZERO, Vector
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 
@@ -16,9 +17,10 @@ SpeedUnit = Literal["rev/s", "rad/s"]
 class Rotor:
     """One rotor: position of its hub in the body frame (FRD), and the way it turns."""
 
-    x_m: float  # forward of the centre of mass
-    y_m: float  # right of the centre of mass
+    x_m: float  # forward of the frame's centre
+    y_m: float  # right of the frame's centre
     spin: int  # +1 clockwise seen from above (positive about body z, down), -1 the other way
+    strength: float = 1.0  # thrust and torque at a speed, over what the vehicle's constants say
 
 
 @dataclass(frozen=True)
@@ -38,9 +40,15 @@ class VehicleNumbers:
     command_quadratic: float
     command_min: float  # at or below it the ESC stops the motor
     command_max: float
+    speed_min: float = 0.0  # an ESC that is told to turn slower stops the motor
     # One rotor and its motor's bell. 0 leaves out the torque of speeding a rotor up and the
-    # gyroscopic torque: DESIGN.md publishes no figure.
+    # gyroscopic torque.
     rotor_inertia_kg_m2: float = 0.0
+    # From the frame's centre, where the IMU is and from where rotors are measured, body FRD.
+    centre_of_mass_m: Vector = ZERO
+    battery_cells: int = 0  # in series
+    curve_voltage_v: float = 0.0  # battery voltage at which the command curve holds
+    escs_answer: bool = False  # they tell rotor speed and voltage when they are asked
 
     def __post_init__(self) -> None:
         if len(self.rotors) != 4:
@@ -58,46 +66,11 @@ class VehicleNumbers:
             "motor_time_constant_s": self.motor_time_constant_s,
             "command_linear + command_quadratic": self.command_linear + self.command_quadratic,
             "command_max - command_min": self.command_max - self.command_min,
+            "strength of a rotor": min(rotor.strength for rotor in self.rotors),
         }
         for key, value in positive.items():
             if not value > 0.0:
                 raise ValueError(f"vehicle {self.name}: {key} must be positive, found {value}")
-
-    @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any]) -> VehicleNumbers:
-        """Build from the binding's dictionary; its keys are the names of the fields above."""
-        name = str(_value(mapping, "name", "vehicle"))
-        where = f"vehicle {name}"
-
-        def number(key: str) -> float:
-            return float(_value(mapping, key, where))
-
-        def rotor(index: int) -> Rotor:
-            entry, here = rotors[index], f"{where}, rotor M{index + 1}"
-            return Rotor(
-                x_m=float(_value(entry, "x_m", here)),
-                y_m=float(_value(entry, "y_m", here)),
-                spin=int(_value(entry, "spin", here)),
-            )
-
-        rotors = _sequence(mapping, "rotors", where, 4)
-        jx, jy, jz = _sequence(mapping, "inertia_kg_m2", where, 3)
-        return cls(
-            name=name,
-            mass_kg=number("mass_kg"),
-            inertia_kg_m2=(float(jx), float(jy), float(jz)),
-            rotors=(rotor(0), rotor(1), rotor(2), rotor(3)),
-            thrust_constant=number("thrust_constant"),
-            torque_constant=number("torque_constant"),
-            speed_unit=_value(mapping, "speed_unit", where),
-            motor_time_constant_s=number("motor_time_constant_s"),
-            command_offset=number("command_offset"),
-            command_linear=number("command_linear"),
-            command_quadratic=number("command_quadratic"),
-            command_min=number("command_min"),
-            command_max=number("command_max"),
-            rotor_inertia_kg_m2=float(mapping.get("rotor_inertia_kg_m2", 0.0)),
-        )
 
     @property
     def weight_n(self) -> float:
@@ -113,7 +86,7 @@ class VehicleNumbers:
         return 2.0 * math.pi if self.speed_unit == "rev/s" else 1.0
 
     def speed_for_command(self, command: float) -> float:
-        """Rotor speed an ESC settles at: the positive root of the command curve.
+        """Rotor speed an ESC settles at, at curve_voltage_v: the root of the command curve.
 
         Written as 2 c / (b + sqrt(b^2 + 4 a c)), which also holds for a = 0. A command that is
         not a number is no pulse at all, and stops the motor.
@@ -122,24 +95,11 @@ class VehicleNumbers:
         if not (command > self.command_min and rise > 0.0):
             return 0.0
         linear = self.command_linear
-        return (
+        speed = (
             2.0 * rise / (linear + math.sqrt(linear * linear + 4.0 * self.command_quadratic * rise))
         )
+        return speed if speed >= self.speed_min else 0.0
 
     def command_for_speed(self, speed: float) -> float:
         """The command curve itself."""
         return self.command_offset + (self.command_linear + self.command_quadratic * speed) * speed
-
-
-def _value(mapping: Mapping[str, Any], key: str, where: str) -> Any:
-    if key not in mapping:
-        found = ", ".join(sorted(map(str, mapping))) or "nothing"
-        raise ValueError(f"{where}: key '{key}' is missing; found {found}")
-    return mapping[key]
-
-
-def _sequence(mapping: Mapping[str, Any], key: str, where: str, length: int) -> Sequence[Any]:
-    value: Sequence[Any] = _value(mapping, key, where)
-    if len(value) != length:
-        raise ValueError(f"{where}: '{key}' has {length} entries, found {len(value)}")
-    return value
