@@ -137,8 +137,11 @@ class Controller {
     const float down = clamped(reference_.accelerationNed.z(), config_.acceleration);
     if (position) {
       const Vector2f level = reference_.accelerationNed.head<2>();
-      tilt = tiltFor(
-          shortening(level, config_.acceleration) * toHeading(doubled(halfReference), level), down);
+      const SinCos heading = doubled(halfReference);
+      tilt = tiltFor(shortening(level, config_.acceleration) * toHeading(heading, level), down);
+      // How fast that tilt changes, to first order: nose down for more forward.
+      const Vector2f jerk = toHeading(heading, reference_.jerkNed.head<2>());
+      tiltRate_ += Vector2f{jerk.y(), -jerk.x()} / (kGravity - down);
     } else {
       tilt *= shortening(tilt, attitudeTiltMost_);
     }
@@ -319,8 +322,9 @@ class Controller {
     const float yaw = wrapAngle(r.yaw);  // NaN beyond its domain
     float sum = s.positionNed.squaredNorm() + s.velocityNed.squaredNorm() +
                 s.rateBody.squaredNorm() + square(s.attitude) + r.positionNed.squaredNorm() +
-                r.velocityNed.squaredNorm() + r.accelerationNed.squaredNorm() + yaw * yaw +
-                r.yawRate * r.yawRate;
+                r.velocityNed.squaredNorm() + r.accelerationNed.squaredNorm() +
+                r.jerkNed.squaredNorm() + yaw * yaw + r.yawRate * r.yawRate +
+                r.yawAcceleration * r.yawAcceleration;
     if (r.mode != ReferenceMode::Position) sum += square(r.attitude) + r.thrust * r.thrust;
     return sum < 1e12F;
   }

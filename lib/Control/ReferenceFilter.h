@@ -147,6 +147,7 @@ class ReferenceFilter {
       motion.acceleration.z() = followYaw(reference, halfHeading, state, stateHalfHeading, start);
     } else if (mode_ == ReferenceMode::Position) {
       halfHeading = sinCos(0.5F * reference.yaw);
+      motion.acceleration.z() = reference.yawAcceleration;
     }
     if (tilt_.on() && mode_ != ReferenceMode::Position) {
       if (start) {
@@ -173,7 +174,7 @@ class ReferenceFilter {
     if (start) {
       yaw_.start(yaw, rate, Angle(angleOf(stateHalfHeading)), Angle(state.rateBody.z()));
     }
-    Angle acceleration(0.0F);
+    Angle acceleration(reference.yawAcceleration);
     yaw_.follow(yaw, rate, acceleration);
     reference.yaw = wrapAngle(yaw[0]);
     reference.yawRate = rate[0];

@@ -15,7 +15,7 @@ class Trajectory {
     last_ = now;
     reference_ = from;
     reference_.mode = ReferenceMode::Position;
-    yawAcceleration_ = 0.0F;
+    reference_.yawAcceleration = 0.0F;
     reference_.yaw = wrapAngle(from.yaw);
     yaw_.planHalt({reference_.yaw, from.yawRate, 0.0F}, limits_);
     targetYaw_ = wrapAngle(yaw_.target());
@@ -47,8 +47,8 @@ class Trajectory {
     if (wrapped != targetYaw_) {
       targetYaw_ = wrapped;
       const float from = reference_.yaw;
-      yaw_.plan({from, reference_.yawRate, yawAcceleration_}, from + wrapAngle(wrapped - from),
-                limits_);
+      yaw_.plan({from, reference_.yawRate, reference_.yawAcceleration},
+                from + wrapAngle(wrapped - from), limits_);
       yawTime_ = 0;
     }
   }
@@ -65,13 +65,14 @@ class Trajectory {
       reference_.positionNed = m.value;
       reference_.velocityNed = m.rate;
       reference_.accelerationNed = m.acceleration;
+      reference_.jerkNed = positionTime_ < position_.duration() ? m.jerk : Vector3f::Zero();
     }
     if (yawTime_ < yaw_.duration()) {
       yawTime_ += step;
       const PathPoint<float> m = yaw_.at(yawTime_);
       reference_.yaw = yawTime_ < yaw_.duration() ? wrapAngle(m.value) : targetYaw_;
       reference_.yawRate = m.rate;
-      yawAcceleration_ = m.acceleration;
+      reference_.yawAcceleration = m.acceleration;
     }
     return reference_;
   }
@@ -98,8 +99,7 @@ class Trajectory {
   WayToRest<Vector3f> position_;
   WayToRest<float> yaw_;
   float targetYaw_ = 0.0F;
-  float yawAcceleration_ = 0.0F;  ///< rad/s^2
-  Micros positionTime_ = 0;       ///< us since the way was planned
+  Micros positionTime_ = 0;  ///< us since the way was planned
   Micros yawTime_ = 0;
 };
 

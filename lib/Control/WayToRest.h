@@ -29,14 +29,6 @@ struct TrajectoryLimits {
   float yawJerk = 480.0F * kDegToRad;          ///< rad/s^3
 };
 
-/// A quantity and its first two derivatives in time.
-template <class T>
-struct PathPoint {
-  T value;
-  T rate;
-  T acceleration;
-};
-
 namespace trajectory {
 
 template <class T>
@@ -84,6 +76,15 @@ constexpr float kPeakJerk = 60.0F;
 
 }  // namespace trajectory
 
+/// A quantity and its first three derivatives in time.
+template <class T>
+struct PathPoint {
+  T value;
+  T rate;
+  T acceleration;
+  T jerk = trajectory::zero<T>();
+};
+
 /// One quantity's way to rest at a target.
 /// @tparam T  float for yaw, Vector3f for a position
 template <class T>
@@ -129,6 +130,10 @@ class WayToRest {
       m.value += way_ * (r * r * r * ((6.0F * r - 15.0F) * r + 10.0F));
       m.rate -= way_ * (30.0F * r * r * gone * gone * perSecond);
       m.acceleration += way_ * (60.0F * r * gone * (1.0F - 2.0F * r) * perSecond * perSecond);
+      if (t >= startTime_) {
+        m.jerk -= way_ * (trajectory::kPeakJerk * (1.0F - 6.0F * r * gone) *
+                          (perSecond * perSecond * perSecond));
+      }
     }
     if (t < stopTime_) {
       const float perSecond = 1.0F / toSeconds(stopTime_);
@@ -136,6 +141,7 @@ class WayToRest {
       m.value += (cube_ + quart_ * r) * (r * r * r);
       m.rate -= (3.0F * cube_ + (4.0F * r) * quart_) * (r * r * perSecond);
       m.acceleration += (6.0F * cube_ + (12.0F * r) * quart_) * (r * perSecond * perSecond);
+      m.jerk -= (6.0F * cube_ + (24.0F * r) * quart_) * (perSecond * perSecond * perSecond);
     }
     return m;
   }
@@ -195,22 +201,9 @@ class WayToRest {
       const PathPoint<T> m = at(t);
       if (trajectory::speedShare(m.rate, limits) > speedLimit) return false;
       if (trajectory::magnitude(m.acceleration) > accelerationLimit) return false;
-      if (trajectory::magnitude(jerk(t)) > jerkLimit) return false;
+      if (trajectory::magnitude(m.jerk) > jerkLimit) return false;
     }
     return true;
-  }
-
-  /// Third derivative at t us since plan(), while the present motion is stopped.
-  [[nodiscard]] T jerk(Micros t) const {
-    const float stop = 1.0F / toSeconds(stopTime_);
-    const float left = toSeconds(stopTime_ - t) * stop;
-    T sum = (6.0F * cube_ + (24.0F * left) * quart_) * (-stop * stop * stop);
-    if (t >= startTime_ && t < startTime_ + moveTime_) {
-      const float move = 1.0F / toSeconds(moveTime_);
-      const float r = toSeconds(startTime_ + moveTime_ - t) * move;
-      sum -= way_ * (trajectory::kPeakJerk * (1.0F + 6.0F * r * (r - 1.0F)) * move * move * move);
-    }
-    return sum;
   }
 
   [[nodiscard]] static float cubeRoot(float x) { return exponential(logarithm(x) * (1.0F / 3.0F)); }

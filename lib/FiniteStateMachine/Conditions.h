@@ -66,9 +66,10 @@ constexpr ConditionSet kMounting = 1U << 12U;
 constexpr ConditionSet kMission = 1U << 13U;
 constexpr ConditionSet kFence = 1U << 14U;
 constexpr ConditionSet kGyroFilter = 1U << 15U;
+constexpr ConditionSet kLayout = 1U << 16U;
 }  // namespace prearm
 
-constexpr std::array<PreArmCheck, 16> kPreArmChecks{{
+constexpr std::array<PreArmCheck, 17> kPreArmChecks{{
     {prearm::kImu, "IMU gives no data: check its wiring"},
     {prearm::kMag, "magnetometer gives no data: check its wiring"},
     {prearm::kAlt, "altimeter gives no data: check its wiring"},
@@ -85,6 +86,7 @@ constexpr std::array<PreArmCheck, 16> kPreArmChecks{{
     {prearm::kMounting, "a mounting matrix in FlightConfig.h is not a rotation"},
     {prearm::kMission, "the mission leaves the fence, or a height in it is not above the ground"},
     {prearm::kFence, "estimated position is outside the fence: restart where you want to fly"},
+    {prearm::kLayout, "the rotors of the vehicle file cannot hold the aircraft level"},
     {prearm::kGyroFilter, "the gyro filter in FlightConfig.h is none: see docs/filtering.md"},
 }};
 

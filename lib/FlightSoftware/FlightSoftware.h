@@ -21,6 +21,8 @@ namespace strix {
 /// @tparam States  of the navigation filter: 18, or 9 without biases
 template <class Board, int States = 18>
 class FlightSoftware {
+  static_assert(Motors::kRateHz == static_cast<float>(Controller::kRateHz));
+
  public:
   FlightSoftware(Board& board, const FlightSoftwareConfig& config)
       : board_(board),
@@ -39,6 +41,7 @@ class FlightSoftware {
         hover_(config.hover.duration),
         wrongConfig_((sensors_.mountingValid() ? 0U : prearm::kMounting) |
                      (gyroFilter_.valid() ? 0U : prearm::kGyroFilter) |
+                     (motors_.valid() ? 0U : prearm::kLayout) |
                      (isFlyable(config.mission, config.fence) ? 0U : prearm::kMission)),
         cosArmTilt_(cosine(config.armTilt)) {}
 

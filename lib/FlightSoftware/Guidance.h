@@ -18,8 +18,8 @@ struct GuidanceConfig {
   float arrivalSpeed = 0.4F;             ///< m/s
   float arrivalYaw = 10.0F * kDegToRad;  ///< rad
   float landingDepth = 3.0F;             ///< m below the start the landing ramp aims at
-  float landingSlowHeight = 1.0F;        ///< m above the start: below it the landing is slower,
-  float landingSlowSpeed = 0.3F;         ///< m/s, as PX4's MPC_LAND_CRWL
+  float landingSlowHeight = 1.0F;        ///< m above the start, as PX4's MPC_LAND_ALT3: below it
+  float landingSlowSpeed = 0.3F;         ///< m/s, as its MPC_LAND_CRWL
   float returnHeight = 3.0F;             ///< m, ours: above people and fences on the way home
   float standThrust = 0.6F;  ///< of the weight, ours: near hover, and the stand holds it
 };

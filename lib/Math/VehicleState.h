@@ -28,7 +28,9 @@ struct Reference {
   Vector3f velocityNed = Vector3f::Zero();      ///< m/s
   float yaw = 0.0F;                             ///< rad
   float yawRate = 0.0F;                         ///< rad/s
-  Vector3f accelerationNed = Vector3f::Zero();  ///< m/s^2, fed forward
+  Vector3f accelerationNed = Vector3f::Zero();  ///< m/s^2, fed forward as tilt and thrust
+  Vector3f jerkNed = Vector3f::Zero();          ///< m/s^3, fed forward as the rate of that tilt
+  float yawAcceleration = 0.0F;                 ///< rad/s^2, fed forward as torque
   ReferenceMode mode = ReferenceMode::Position;
   Quaternion attitude{};  ///< body to NED; not in Position
   float thrust = 0.0F;    ///< N, along -z body; in Attitude only

@@ -4,6 +4,7 @@ void runControllerTests();
 void runReferenceRampTests();
 void runGainVectorTests();
 void runReducedObserverTests();
+void runStickMappingTests();
 void runTrajectoryTests();
 void runControlLimitsTests();
 void runIntegralActionTests();

@@ -11,6 +11,7 @@ int main() {
   runReferenceRampTests();
   runGainVectorTests();
   runReducedObserverTests();
+  runStickMappingTests();
   runTrajectoryTests();
   runControlLimitsTests();
   runIntegralActionTests();

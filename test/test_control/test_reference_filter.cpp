@@ -1,5 +1,6 @@
 #include <ReferenceFilter.h>
 #include <ReferenceRamp.h>
+#include <Trajectory.h>
 #include <unity.h>
 
 #include <cmath>
@@ -254,6 +255,39 @@ void test_with_it_a_yaw_step_is_flown_within_a_second_and_without_overshoot() {
   }
 }
 
+/// Furthest beyond a target 1 m ahead, along the trajectory to it; m.
+double overshootAlongTrajectory(const Flown& flown, float yaw, bool withJerk) {
+  Loop loop(flown.vehicle, flown.gains, yaw);
+  Trajectory path;
+  path.reset(loop.now, at(Vector3f::Zero(), yaw));
+  path.setTarget(fromStartFrame({1.0F, 0.0F, 0.0F}, yaw), yaw);
+  double furthest = 0.0;
+  for (int k = 0; k < 5000; ++k) {
+    Reference reference = path.update(loop.now);
+    if (!withJerk) reference.jerkNed.setZero();
+    loop.step(reference);
+    furthest = std::max(furthest, inStartFrame(loop.quad.position, yaw).x());
+  }
+  return furthest - 1.0;
+}
+
+void test_a_metre_along_a_trajectory_is_flown_without_overshoot() {
+  // 1 cm, a thirtieth of what GPS lets the aircraft know of its place; UgglanQ450's motors take
+  // twice as long to tilt it.
+  struct Flight {
+    Flown flown;
+    double most;
+  };
+  for (const Flight& flight :
+       {Flight{{kQuad5in, kQuad5inGains}, 0.01}, Flight{{kUgglanQ450, kUgglanQ450Gains}, 0.03}}) {
+    for (const float yaw : kHeadings) {
+      TEST_ASSERT_TRUE(overshootAlongTrajectory(flight.flown, yaw, true) < flight.most);
+    }
+    // That is the jerk's doing: without it the rate loop brakes the tilt.
+    TEST_ASSERT_TRUE(overshootAlongTrajectory(flight.flown, 0.0F, false) > 3.0 * flight.most);
+  }
+}
+
 }  // namespace
 
 void runReferenceFilterTests() {
@@ -266,5 +300,6 @@ void runReferenceFilterTests() {
   RUN_TEST(test_an_attitude_step_is_smooth_the_same_at_every_heading_and_its_rate_is_true);
   RUN_TEST(test_it_starts_where_the_aircraft_is_and_how_it_moves);
   RUN_TEST(test_off_it_changes_nothing);
+  RUN_TEST(test_a_metre_along_a_trajectory_is_flown_without_overshoot);
   RUN_TEST(test_with_it_a_yaw_step_is_flown_within_a_second_and_without_overshoot);
 }

@@ -142,6 +142,33 @@ void test_from_rest_the_way_takes_as_long_as_its_peaks_say() {
   TEST_ASSERT_FLOAT_WITHIN(0.004F, 1.875F * 90.0F / 60.0F, turn.run());
 }
 
+void test_the_jerk_is_the_derivative_of_the_acceleration() {
+  Trajectory path;
+  path.reset(0, restAt(Vector3f::Zero(), 0.0F));
+  path.setTarget({3.0F, -2.0F, -1.0F}, 1.0F);
+  Micros now = 0;
+  Reference before = path.update(now += kStep);
+  Reference here = path.update(now += kStep);
+  int compared = 0;
+  while (!path.arrived()) {
+    if (now == 1'000'000) path.setTarget({0.0F, 4.0F, -2.0F}, 0.5F);  // then a stop is added to it
+    const Reference next = path.update(now += kStep);
+    const Vector3f slope =
+        (next.accelerationNed - before.accelerationNed) / (2.0F * toSeconds(kStep));
+    // Central difference of a polynomial: what it leaves out is below 60 D / T^5 dt^2; rounding of
+    // 2 m/s^2 over 4 ms is 1e-4. Not where a part begins or ends: there the jerk jumps.
+    if ((next.jerkNed - here.jerkNed).norm() < 0.1F &&
+        (here.jerkNed - before.jerkNed).norm() < 0.1F) {
+      TEST_ASSERT_TRUE((slope - here.jerkNed).norm() < 0.01F);
+      ++compared;
+    }
+    before = here;
+    here = next;
+  }
+  TEST_ASSERT_TRUE(compared > 1000);
+  TEST_ASSERT_TRUE(path.reference().jerkNed.isZero() && path.reference().yawAcceleration == 0.0F);
+}
+
 void test_yaw_takes_the_short_way_round() {
   Watched right(restAt({0, 0, 0}, 170.0F * kDegToRad));
   right.path.setTarget({0, 0, 0}, -170.0F * kDegToRad);
@@ -289,6 +316,7 @@ void runTrajectoryTests() {
   RUN_TEST(test_a_trajectory_starts_where_the_aircraft_is_and_stays_there);
   RUN_TEST(test_the_way_is_straight_and_never_turns_back);
   RUN_TEST(test_from_rest_the_way_takes_as_long_as_its_peaks_say);
+  RUN_TEST(test_the_jerk_is_the_derivative_of_the_acceleration);
   RUN_TEST(test_yaw_takes_the_short_way_round);
   RUN_TEST(test_a_new_target_on_the_way_is_taken_without_a_jump_and_met_exactly);
   RUN_TEST(test_any_targets_at_any_time_keep_the_limits_and_are_met);
