@@ -18,12 +18,12 @@ struct Airframe {
   const Vehicle& vehicle;
   const Gains& gains;                          ///< that fly: integral action, motor lag known
   const std::array<const Gains*, 4>& designs;  ///< those, no integral, no lag, neither
-  const ObserverGains* observer = nullptr;     ///< of Ugglan's attitude law
+  const ObserverGains* observer = nullptr;     ///< of Ugglan's attitude law at 500 Hz
 };
 
 constexpr std::array<Airframe, 2> kAirframes{{
     {kQuad5in, kQuad5inGains, kQuad5inDesigns},
-    {kUgglanQ450, kUgglanQ450Gains, kUgglanQ450Designs, &kUgglanQ450ObserverGains},
+    {kUgglanQ450, kUgglanQ450Gains, kUgglanQ450Designs, &kUgglanQ450ObserverGains500Hz},
 }};
 
 /// @return nullptr when there is none of that name

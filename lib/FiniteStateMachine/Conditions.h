@@ -84,7 +84,7 @@ constexpr std::array<PreArmCheck, 17> kPreArmChecks{{
     {prearm::kStartSwitch, "start switch is on: turn it off first"},
     {prearm::kLog, "log card has failed or is missing: check the card"},
     {prearm::kMounting, "a mounting matrix in FlightConfig.h is not a rotation"},
-    {prearm::kMission, "the mission leaves the fence, or a height in it is not above the ground"},
+    {prearm::kMission, "the mission cannot be flown: mend mission.txt on the card, or FlightConfig.h"},
     {prearm::kFence, "estimated position is outside the fence: restart where you want to fly"},
     {prearm::kLayout, "the rotors of the vehicle file cannot hold the aircraft level"},
     {prearm::kGyroFilter, "the gyro filter in FlightConfig.h is none: see docs/filtering.md"},

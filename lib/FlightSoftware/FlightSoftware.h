@@ -11,6 +11,7 @@
 #include "FlightSoftwareConfig.h"
 #include "Guidance.h"
 #include "Logger.h"
+#include "MissionText.h"
 #include "Motors.h"
 #include "Navigation.h"
 #include "Sensors.h"
@@ -66,6 +67,7 @@ class FlightSoftware {
     }
     logger_.begin(time,
                   {config_.vehicle.name, Board::kName, kVersion, kGitCommit, board_.bootId()});
+    loadMission(time);
     const Mission& mission = config_.mission;
     logger_.log(toRecord(time, config_, found_));
     for (std::size_t i = 0; i < mission.legCount && i < Mission::kMaxLegs; ++i) {
@@ -182,6 +184,21 @@ class FlightSoftware {
       logger_.log(toRecord(time, clock_.at(escs.sampled), escs));
     }
     motors_.setBatteryVoltage(battery_.voltage());
+  }
+
+  /// The card's mission instead of the one compiled in; one that is wrong forbids arming.
+  void loadMission(LogTime time) {
+    const std::string_view text = board_.missionText();
+    if (text.empty()) return;
+    const ParsedMission parsed = parseMission("mission.txt", text, config_.fence);
+    if (!parsed.valid()) {
+      wrongConfig_ |= prearm::kMission;
+      logger_.logText(ulog::LogLevel::Error, time, MissionErrorText(parsed.error).text());
+      return;
+    }
+    wrongConfig_ &= ~prearm::kMission;
+    config_.mission = parsed.mission;
+    guidance_ = Guidance(parsed.mission, config_.guidance, config_.vehicle.mass * kGravity);
   }
 
   [[nodiscard]] bool calibrating() const { return fsm_.state() == FlightState::Boot; }
@@ -381,7 +398,7 @@ class FlightSoftware {
   SensorSet found_;
   Persistence touchDown_;
   Persistence hover_;
-  const ConditionSet wrongConfig_;  ///< what no flight can mend
+  ConditionSet wrongConfig_;  ///< what no flight can mend
   const float cosArmTilt_;
   PeriodicTask stateLog_{periodFromHz(10)};
   PeriodicTask switchLog_{periodFromHz(1)};

@@ -49,6 +49,7 @@ std::uint32_t numberOf(const char* name) {
 bool SdCard::begin() {
   writable_ = false;
   if (!sd_.begin(SdioConfig(kTransfer))) return false;
+  readMission();
   const std::uint32_t newest = newestLogNumber();
   if (newest >= kMaxLogNumber) return false;
   if (newest > 0) cutToWritten(newest);
@@ -58,6 +59,15 @@ bool SdCard::begin() {
   heldIsNew_ = open_ = filled_ = stopAsked_ = false;
   writable_ = true;
   return true;
+}
+
+void SdCard::readMission() {
+  missionSize_ = 0;
+  FsFile file;
+  if (!file.open("mission.txt", O_RDONLY)) return;
+  const int size = file.read(mission_.data(), mission_.size());
+  if (size > 0) missionSize_ = static_cast<std::size_t>(size);
+  file.close();
 }
 
 std::uint32_t SdCard::newestLogNumber() {

@@ -5,8 +5,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "BlockDevice.h"
+#include "MissionText.h"
 
 #include <Arduino.h>
 #include <SdFat.h>
@@ -37,6 +39,10 @@ class SdCard {
   /// all it has. That is done when busy() is false again: nothing waits here. Bound as writeSector.
   [[nodiscard]] bool sync(std::uint32_t length);
 
+  /// What mission.txt holds, read by begin(); empty without one. A longer one is cut, one byte
+  /// beyond what a mission may have.
+  [[nodiscard]] std::string_view missionText() const { return {mission_.data(), missionSize_}; }
+
   /// Number in this start's file name; 0 without a card.
   [[nodiscard]] std::uint32_t logNumber() const { return logNumber_; }
 
@@ -48,6 +54,7 @@ class SdCard {
   static constexpr std::uint32_t kMaxLogNumber = 9999;
   static constexpr std::uint32_t kNone = 0xFFFFFFFF;
 
+  void readMission();
   [[nodiscard]] std::uint32_t newestLogNumber();
   void cutToWritten(std::uint32_t number);
   [[nodiscard]] bool isBlank(std::uint32_t sector);
@@ -69,6 +76,8 @@ class SdCard {
   bool filled_ = false;            // a sector is on its way from the FIFO
   bool stopAsked_ = false;         // the transfer is to be ended when the card is ready
   bool writable_ = false;
+  std::array<char, mission_text::kMostBytes + 1> mission_{};
+  std::size_t missionSize_ = 0;
   alignas(4) Sector sector_{};
 };
 

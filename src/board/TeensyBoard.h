@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 
 #include "Board.h"
 #include "RawSamples.h"
@@ -45,6 +46,8 @@ class TeensyBoard {
   [[nodiscard]] static bool readEscStatus(EscRaw& /*out*/) { return false; }
   /// No receiver yet.
   [[nodiscard]] static PilotSticks readSticks() { return {}; }
+
+  [[nodiscard]] std::string_view missionText() const { return card_.missionText(); }
 
   void countFaults(SensorFaultCounts& out) const;
 

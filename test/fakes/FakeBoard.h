@@ -1,6 +1,7 @@
 /// A Board for tests: clock, devices, switches and card do what the test says.
 #pragma once
 
+#include <string_view>
 #include <vector>
 
 #include "Board.h"
@@ -63,6 +64,7 @@ class BasicFakeBoard {
   PilotSticks sticks;
   FakeDevice<BatteryRaw> battery{100'000};
   FakeDevice<EscRaw> escs{200'000};
+  const char* mission = "";  ///< mission.txt on the card
   SensorFaultCounts faults;  ///< of its devices
   Card sd;
   Vector3f gyroBias{0.01F, -0.02F, 0.015F};     ///< rad/s; used by hold()
@@ -122,6 +124,7 @@ class BasicFakeBoard {
   [[nodiscard]] bool readBattery(BatteryRaw& out) { return battery.read(time_, start_, out); }
   [[nodiscard]] bool readEscStatus(EscRaw& out) { return escs.read(time_, start_, out); }
   [[nodiscard]] PilotSticks readSticks() const { return sticks; }
+  [[nodiscard]] std::string_view missionText() const { return mission; }
   void countFaults(SensorFaultCounts& out) const { out = faults; }
   [[nodiscard]] PilotSwitches readPilot() const { return pilot; }
   void writeEsc(const EscCommands& commands) { escWrites.push_back({time_, commands}); }

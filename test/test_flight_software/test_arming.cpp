@@ -140,6 +140,8 @@ const Refusal kRefusals[] = {
      kAsUsual},
     {prearm::kMission, [](FlightSoftwareConfig& c) { c.mission.takeoffHeight = -1.0F; }, kAsUsual,
      kAsUsual},
+    {prearm::kMission, kAsUsual, [](FakeBoard& b) { b.mission = "takeoff 2 1\nleg 31 0 2 0 1\n"; },
+     kAsUsual},
     {prearm::kGyroFilter, [](FlightSoftwareConfig& c) { c.gyroFilter.lowPass = 600.0F; }, kAsUsual,
      kAsUsual},  // beyond Nyquist
     // The estimate left a fence of 3 cm, on the ground, with the GPS.
@@ -156,7 +158,7 @@ const Refusal kRefusals[] = {
 };
 
 void test_each_check_that_fails_refuses_arming_and_says_why() {
-  ConditionSet tested = prearm::kNotCalibrated;  // has a test of its own
+  ConditionSet tested = prearm::kNotCalibrated | prearm::kLayout;  // have tests of their own
   for (const Refusal& refusal : kRefusals) {
     FlightSoftwareConfig config = lowFlight();
     refusal.configure(config);
@@ -174,6 +176,19 @@ void test_each_check_that_fails_refuses_arming_and_says_why() {
     tested |= refusal.bit;
   }
   TEST_ASSERT_EQUAL_HEX32((ConditionSet{1} << kPreArmChecks.size()) - 1U, tested);
+}
+
+void test_rotors_that_cannot_hold_the_aircraft_level_never_arm() {
+  static const Vehicle unbalanced = [] {
+    Vehicle vehicle = kQuad5in;
+    for (Rotor& rotor : vehicle.rotors) rotor.x = 0.08F;  // all of them in front
+    return vehicle;
+  }();
+  FakeFlight flight(0, flightConfig(unbalanced, kQuad5inGains, kLowMission, 0.07F));
+  flight.getReady();
+  TEST_ASSERT_FALSE(flight.arm());
+  TEST_ASSERT_TRUE(flight.logSays(firstRefusal(prearm::kLayout)));
+  for (const auto& write : flight.board.escWrites) TEST_ASSERT_TRUE(areOff(write.commands));
 }
 
 void test_arming_in_boot_is_refused_and_says_why() {
@@ -250,6 +265,7 @@ void runArmingTests() {
   RUN_TEST(test_a_switch_held_through_power_up_never_arms);
   RUN_TEST(test_a_switch_thrown_too_early_must_be_thrown_again);
   RUN_TEST(test_each_check_that_fails_refuses_arming_and_says_why);
+  RUN_TEST(test_rotors_that_cannot_hold_the_aircraft_level_never_arm);
   RUN_TEST(test_arming_in_boot_is_refused_and_says_why);
   RUN_TEST(test_a_dead_device_that_keeps_the_aircraft_in_boot_is_named);
   RUN_TEST(test_a_card_that_fails_refuses_arming);

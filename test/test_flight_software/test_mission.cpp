@@ -182,11 +182,30 @@ void test_the_landing_goes_straight_down_from_the_last_leg_and_on_below_the_star
   TEST_ASSERT_TRUE(belowStart);
 }
 
+void test_the_mission_on_the_card_is_flown_in_place_of_the_one_compiled_in() {
+  FakeFlight flight;
+  flight.board.mission = "takeoff 0.4 0.5\r\nland\r\n";
+  flight.getReady();
+  flight.reach(FlightState::Takeoff);
+  TEST_ASSERT_TRUE(flight.runUntil(FlightState::Land, 5.0F));  // no leg comes before
+  TEST_ASSERT_FLOAT_WITHIN(1e-6F, -0.4F, flight.software.guidance().reference().positionNed.z());
+}
+
+void test_a_wrong_mission_on_the_card_is_refused_with_its_line() {
+  FakeFlight flight;
+  flight.board.mission = "takeoff 2 1\nleg 5 five 2 0 1\n";
+  flight.getReady();
+  TEST_ASSERT_FALSE(flight.arm());
+  TEST_ASSERT_TRUE(flight.logSays("line 2, EAST_M: expected a number, found 'five'"));
+}
+
 }  // namespace
 
 void runMissionTests() {
   Unity.TestFile = __FILE__;
   RUN_TEST(test_the_fence_is_a_cylinder_around_the_start);
+  RUN_TEST(test_the_mission_on_the_card_is_flown_in_place_of_the_one_compiled_in);
+  RUN_TEST(test_a_wrong_mission_on_the_card_is_refused_with_its_line);
   RUN_TEST(test_a_mission_that_leaves_the_air_or_the_fence_is_not_flyable);
   RUN_TEST(test_a_sign_is_believed_once_it_has_lasted);
   RUN_TEST(test_a_break_in_a_sign_starts_its_time_anew);

@@ -51,6 +51,7 @@ class BareBoard {
   [[nodiscard]] static bool readGps(strix::GpsRaw& out) { return read(out); }
   [[nodiscard]] static bool readBattery(strix::BatteryRaw& out) { return read(out); }
   [[nodiscard]] static bool readEscStatus(strix::EscRaw& out) { return read(out); }
+  [[nodiscard]] static std::string_view missionText() { return anything<std::string_view>(); }
   static void countFaults(strix::SensorFaultCounts& out) {
     out = anything<strix::SensorFaultCounts>();
   }

@@ -39,10 +39,11 @@ def main() -> None:
 def fly(
     vehicle: Annotated[str, typer.Option(help="Airframe, of include/vehicles/")] = "Quad5in",
     mission: Annotated[
-        str, typer.Option(help="Mission of include/missions/, or a mission file")
-    ] = "first-flight",
+        str | None,
+        typer.Option(help="Of missions/ or include/missions/, or a file; else the scenario's own"),
+    ] = None,
     scenario: Annotated[
-        str, typer.Option(help="What surrounds the flight: calm, wind, …")
+        str, typer.Option(help="What surrounds the flight: calm, wind, hover-wind, stand-4, …")
     ] = "calm",
     heading: Annotated[float, typer.Option(help="Start heading, deg clockwise from north")] = 0.0,
     seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Of all noise and gusts")] = 1,
@@ -53,7 +54,7 @@ def fly(
 ) -> None:
     """Fly a mission in simulation: the flight software itself against a simulated aircraft.
 
-    Exits with 0 when the aircraft landed and disarmed, with 1 when it did not.
+    Exits with 0 when the flight ended as its scenario has to, with 1 when it did not.
     """
     from strix.fly import fly_and_report, make_plan
     from strix.summary import print_summary
@@ -64,8 +65,9 @@ def fly(
         print(json.dumps(summary.to_dict()))
     else:
         print_summary(summary)
+        print(summary.sentence())
         print(f"{out}/flight.ulg, {out}/report.html, {out}/summary.json")
-    if not (summary.landed and summary.disarmed):
+    if not summary.as_expected:
         raise typer.Exit(1)
 
 

@@ -12,7 +12,8 @@ from strix.missions import Mission
 from strix.plant.earth import MAGNETIC_DECLINATION_RAD
 from strix.plant.frames import Matrix
 from strix.plant.plant import Plant
-from strix.plant.sensors import DEFAULT_CONSTANTS, Samples, SensorConstants, SensorSuite
+from strix.plant.samples import Samples
+from strix.plant.sensors import DEFAULT_CONSTANTS, SensorConstants, SensorSuite
 from strix.scenarios import Scenario, configure
 from strix.track import TruthRecorder, TruthTrack
 from strix.vehicles import plant_numbers

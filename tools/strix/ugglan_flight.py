@@ -18,7 +18,8 @@ import numpy as np
 from strix import _core
 from strix.plant import Plant, SensorConstants, SensorSuite, Surroundings, Truth
 from strix.plant.earth import MAGNETIC_DECLINATION_RAD
-from strix.plant.sensors import DEFAULT_CONSTANTS, Samples
+from strix.plant.samples import Samples
+from strix.plant.sensors import DEFAULT_CONSTANTS
 from strix.simulation import MAG_MOUNTING, STEP_US, TRUTH_EVERY
 from strix.track import TruthRecorder, TruthTrack
 from strix.vehicles import plant_numbers

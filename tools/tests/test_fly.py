@@ -255,12 +255,19 @@ def test_an_out_folder_that_cannot_be_written_is_told_in_one_line(tmp_path: Path
     assert result.stderr.count("\n") == 1
 
 
-def test_a_wrong_mission_file_is_told_with_its_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("leg 1 2 x 0 1", "HEIGHT_M: expected a number, found 'x'"),
+        ("leg 100 0 2 0 1", "NORTH_M: expected -30 to 30 m, found '100'"),  # out of the fence
+    ],
+)
+def test_a_wrong_mission_file_is_told_with_its_line(line: str, told: str, tmp_path: Path) -> None:
     mission = tmp_path / "mission.txt"  # what else can be wrong in one: test_missions.py
-    mission.write_text("takeoff 2 1\nleg 1 2 x 0 1\n", encoding="utf-8")
+    mission.write_text(f"takeoff 2 1\n{line}\n", encoding="utf-8")
     result = CliRunner().invoke(
         app, ["fly", "--mission", str(mission), "--out", str(tmp_path / "out")]
     )
     assert result.exit_code == 2
-    assert f"{mission}, line 2, HEIGHT_M" in result.stderr
+    assert f"{mission}, line 2, {told}" in result.stderr
     assert result.stderr.count("\n") == 1

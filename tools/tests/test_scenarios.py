@@ -46,9 +46,8 @@ class Flight:
         vector = w0 * np.array(v1) - w1 * np.array(v0) - np.cross(v0, v1)
         scalar = w0 * w1 + float(np.dot(v0, v1))
         size = float(np.linalg.norm(vector))
-        return np.degrees(2.0 * math.atan2(size, abs(scalar)) * vector / max(size, 1e-12)) * (
-            1.0 if scalar >= 0.0 else -1.0
-        )
+        angle = math.copysign(2.0 * math.atan2(size, abs(scalar)), scalar)
+        return np.asarray(np.degrees(angle) * vector / max(size, 1e-12))
 
     def tilt_deg(self, begin_s: float, end_s: float) -> np.ndarray:
         during = (self.track.time_s >= begin_s) & (self.track.time_s < end_s)

@@ -12,7 +12,7 @@ from test_plant_vehicle import QUAD5IN
 from strix.plant import Plant, SensorConstants, SensorSuite, Surroundings, Truth
 from strix.plant.earth import MAGNETIC_DECLINATION_RAD, pressure_pa
 from strix.plant.frames import IDENTITY, Matrix, level_at_heading
-from strix.plant.sensors import Samples
+from strix.plant.samples import Samples
 
 G = 9.80665
 CALM = Surroundings()

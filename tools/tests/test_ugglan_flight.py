@@ -123,7 +123,7 @@ def test_the_flight_is_alike_at_every_heading(flights: dict[float, Flown]) -> No
     n = min(map(len, paths))
     # The same noise in the same axes, but for the field's: 0.3 uT of 16 are 1 deg of heading.
     for path in paths[1:]:
-        assert np.abs(path[:n] - paths[0][:n]).max() < 0.15
+        assert np.abs(path[:n] - paths[0][:n]).max() < 0.05
 
 
 def test_it_flies_in_a_breeze(tmp_path: Path) -> None:

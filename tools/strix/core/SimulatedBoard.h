@@ -5,6 +5,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "FileCard.h"
 
@@ -35,6 +36,8 @@ class SimulatedBoard {
   [[nodiscard]] bool readBattery(BatteryRaw& out) { return take(battery_, out); }
   [[nodiscard]] bool readEscStatus(EscRaw& out) { return take(escs_, out); }
   [[nodiscard]] PilotSticks readSticks() const { return sticks_; }
+  /// The simulator's mission comes with the configuration, a replay's from the log.
+  [[nodiscard]] static std::string_view missionText() { return {}; }
   void countFaults(SensorFaultCounts& /*out*/) const {}  // nothing is in the way here
   [[nodiscard]] PilotSwitches readPilot() const { return pilot_; }
   void writeEsc(const EscCommands& commands) { esc_ = commands; }

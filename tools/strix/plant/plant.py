@@ -81,17 +81,18 @@ class Plant:
         )  # N per speed_unit and m/s, one rotor
         self._momentum_per_speed = vehicle.rotor_inertia_kg_m2 * vehicle.rad_s_per_unit
         self._turns_per_s = vehicle.rad_s_per_unit / (2.0 * math.pi)
-        # x, y, spin, thrust over n^2, torque on the body over n^2; M1..M4.
+        # x, y, thrust over n^2, torque on the body over n^2; M1..M4.
         self._rotors = [
             (
                 rotor.x_m,
                 rotor.y_m,
-                rotor.spin,
                 vehicle.thrust_constant * rotor.strength,
                 -rotor.spin * vehicle.torque_constant * rotor.strength,
             )
             for rotor in vehicle.rotors
         ]
+        self._spins = tuple(rotor.spin for rotor in vehicle.rotors)
+        self._thrust_constants = tuple(rotor[2] for rotor in self._rotors)
         # Exact first-order lag over half a step of the usual length.
         self._half_step = (MAX_STEP_US, self._lag(MAX_STEP_US))
         self._time_us = 0
@@ -182,9 +183,7 @@ class Plant:
         tx, ty, tz = -q * h, p * h, -spin_up_n_m
 
         rotor_drag = self._rotor_drag
-        for (x, y, _, thrust_constant, torque_constant), n in zip(
-            self._rotors, speeds, strict=True
-        ):
+        for (x, y, thrust_constant, torque_constant), n in zip(self._rotors, speeds, strict=True):
             square = n * n
             thrust = thrust_constant * square  # along -z
             # H-force: against the hub's velocity in the rotor plane, v + omega x r.
@@ -210,7 +209,7 @@ class Plant:
     def _rotor_momentum(self, speeds: Sequence[float]) -> float:
         """Angular momentum of the spinning rotors about body z, N m s."""
         n1, n2, n3, n4 = speeds
-        (_, _, s1, *_), (_, _, s2, *_), (_, _, s3, *_), (_, _, s4, *_) = self._rotors
+        s1, s2, s3, s4 = self._spins
         return self._momentum_per_speed * (s1 * n1 + s2 * n2 + s3 * n3 + s4 * n4)
 
     def _power(self, speeds: Sequence[float]) -> float:
@@ -244,7 +243,7 @@ class Plant:
 
     def _observe(self, specific_force: Vector) -> Truth:
         body, (n1, n2, n3, n4), (t1, t2, t3, t4) = self._body, self._speeds, self._turns
-        (_, _, _, k1, _), (_, _, _, k2, _), (_, _, _, k3, _), (_, _, _, k4, _) = self._rotors
+        k1, k2, k3, k4 = self._thrust_constants
         thrust = k1 * n1 * n1 + k2 * n2 * n2 + k3 * n3 * n3 + k4 * n4 * n4
         battery = self._battery
         return Truth(

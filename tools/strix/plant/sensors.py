@@ -21,6 +21,15 @@ from strix.plant.earth import (
 from strix.plant.frames import IDENTITY, Matrix, Vector, rotate_to_body
 from strix.plant.noise import normal_stream
 from strix.plant.plant import Truth
+from strix.plant.samples import (
+    BaroSample,
+    BatterySample,
+    EscSample,
+    GpsSample,
+    ImuSample,
+    MagSample,
+    Samples,
+)
 from strix.plant.surroundings import Surroundings
 from strix.plant.vehicle import STANDARD_GRAVITY_M_S2
 
@@ -94,69 +103,6 @@ class SensorConstants:
 
 
 DEFAULT_CONSTANTS = SensorConstants()
-
-
-@dataclass(frozen=True, slots=True)
-class ImuSample:
-    sampled_us: int
-    accel_m_s2: Vector  # specific force, body FRD
-    gyro_rad_s: Vector  # body FRD
-
-
-@dataclass(frozen=True, slots=True)
-class MagSample:
-    sampled_us: int
-    field_ut: Vector  # in the sensor's own axes
-
-
-@dataclass(frozen=True, slots=True)
-class BaroSample:
-    sampled_us: int
-    pressure_pa: float
-    temperature_degc: float
-
-
-@dataclass(frozen=True, slots=True)
-class GpsSample:
-    """What GGA and RMC carry, in their resolution."""
-
-    sampled_us: int
-    latitude_1e7deg: int
-    longitude_1e7deg: int
-    altitude_mm: int  # above mean sea level
-    speed_knots: float
-    course_deg: float  # over ground from true north, clockwise, 0 to below 360
-    fix: int  # 0 none, 2 or 3 dimensions
-    satellites: int
-    hdop: float
-
-
-@dataclass(frozen=True, slots=True)
-class BatterySample:
-    sampled_us: int
-    voltage_v: float
-    current_a: float
-
-
-@dataclass(frozen=True, slots=True)
-class EscSample:
-    """M1..M4."""
-
-    sampled_us: int
-    rev_s: tuple[float, float, float, float]  # mean since the sample before
-    voltage_v: tuple[float, float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Samples:
-    """What became ready since the last call."""
-
-    imu: ImuSample | None = None
-    mag: MagSample | None = None
-    baro: BaroSample | None = None
-    gps: GpsSample | None = None
-    battery: BatterySample | None = None
-    esc: EscSample | None = None
 
 
 class _Channel:
@@ -293,8 +239,8 @@ class SensorSuite:
             mag=None if mag is None else self._read_mag(mag),
             baro=None if baro is None else self._read_baro(baro),
             gps=None if gps is None else self._read_gps(gps),
-            battery=self._read_battery(truth),
-            esc=self._read_escs(truth),
+            battery=None if self._battery_clock is None else self._read_battery(truth),
+            esc=None if self._esc_clock is None else self._read_escs(truth),
         )
 
     def _ready(self, device: Device, clock: _Clock | None, now_us: int) -> Truth | None:

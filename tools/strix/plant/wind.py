@@ -122,7 +122,7 @@ class Wind:
         if changed or duration_s != self._step_s:
             self._height_m, self._step_s = height_m, duration_s
             self._sigmas = gust_sigmas_m_s(height_m, self._speed)
-            gusts = (self._along, self._across, self._down)
+            gusts: list[_FirstOrder | _SecondOrder] = [self._along, self._across, self._down]
             for gust, length_m in zip(gusts, gust_lengths_m(height_m), strict=True):
                 gust.set_times(length_m / self._speed, duration_s)
         self._along.advance()
