@@ -109,7 +109,7 @@ class UgglanFlight {
   [[nodiscard]] bool controlling() const { return !grounded_; }
   [[nodiscard]] const Motors& motors() const { return motors_; }
   [[nodiscard]] Logger<typename Board::Card>& logger() { return logger_; }
-  [[nodiscard]] std::uint32_t overruns() const { return sensors_.missed() + control_.overruns(); }
+  [[nodiscard]] std::uint32_t overruns() const { return control_.overruns(); }
 
  private:
   void readSensors(Micros now, LogTime time) {

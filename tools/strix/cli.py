@@ -45,6 +45,13 @@ def fly(
     scenario: Annotated[
         str, typer.Option(help="What surrounds the flight: calm, wind, hover-wind, stand-4, …")
     ] = "calm",
+    controller: Annotated[
+        str,
+        typer.Option(
+            help="lqr; ugglan: its attitude law under the LQR's positions; sticks: Ugglan's own "
+            "pipeline and a pilot"
+        ),
+    ] = "lqr",
     heading: Annotated[float, typer.Option(help="Start heading, deg clockwise from north")] = 0.0,
     seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Of all noise and gusts")] = 1,
     out: Annotated[
@@ -56,11 +63,11 @@ def fly(
 
     Exits with 0 when the flight ended as its scenario has to, with 1 when it did not.
     """
-    from strix.fly import fly_and_report, make_plan
+    from strix.fly import fly_and_report, fly_sticks_and_report, make_plan
     from strix.summary import print_summary
 
-    plan = make_plan(vehicle, mission, scenario, heading, seed)
-    summary = fly_and_report(plan, out)
+    plan = make_plan(vehicle, mission, scenario, heading, seed, controller)
+    summary = (fly_sticks_and_report if controller == "sticks" else fly_and_report)(plan, out)
     if as_json:
         print(json.dumps(summary.to_dict()))
     else:

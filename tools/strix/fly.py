@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import math
 import time
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from enum import StrEnum
 from pathlib import Path
 
 from rich.console import Console
@@ -19,6 +21,9 @@ from strix.scenarios import Outcome, find_scenario, judge
 from strix.simulation import FlightPlan
 from strix.simulation import fly as simulate
 from strix.summary import Summary, summarise
+from strix.track import TruthTrack
+from strix.ugglan_flight import VEHICLE as STICKS_VEHICLE
+from strix.ugglan_flight import fly_ugglan
 from strix.vehicles import vehicle_name
 
 USUAL_FLIGHT_S = 60.0  # the first flight's; the bar stays full when one takes longer
@@ -42,19 +47,67 @@ class Flown(Summary):
         return f"{self.scenario}: {self.outcome}, {found}"
 
 
+class Controller(StrEnum):
+    """What flies the aircraft."""
+
+    LQR = "lqr"  # positions and attitude, FlightSoftware.h
+    UGGLAN = "ugglan"  # the LQR's positions, and under them Ugglan's law for the attitude
+    STICKS = "sticks"  # Ugglan's own pipeline, UgglanFlight.h, and a pilot who sees the aircraft
+
+
+# Under Ugglan's law, which integrates attitude errors itself and knows the motors' lag: the
+# positions of the design with integral action that leaves the lag to the attitude law.
+_UGGLAN_LAW = (("reduced_observer", True), ("design", 2))
+
+
 def make_plan(
-    vehicle: str, mission: str | None, scenario: str, heading_deg: float, seed: int
+    vehicle: str,
+    mission: str | None,
+    scenario: str,
+    heading_deg: float,
+    seed: int,
+    controller: str = Controller.LQR,
 ) -> FlightPlan:
     """Checks what the user asked for; without a mission the scenario's own is flown."""
     if not math.isfinite(heading_deg):
         raise BadInput(f"--heading: expected degrees, found {heading_deg}")
     found = find_scenario(scenario)
-    name = mission or found.mission
-    return FlightPlan(vehicle_name(vehicle), find_mission(name), found, heading_deg, seed)
+    name = vehicle_name(vehicle)
+    if controller not in tuple(Controller):
+        raise BadInput(
+            f"--controller: expected one of {', '.join(Controller)}, found '{controller}'"
+        )
+    if controller != Controller.LQR and name != STICKS_VEHICLE:
+        raise BadInput(
+            f"--controller {controller}: expected --vehicle {STICKS_VEHICLE}, of whose "
+            f"motors the law knows, found {name}"
+        )
+    if controller == Controller.UGGLAN:
+        found = replace(found, settings=(*found.settings, *_UGGLAN_LAW))
+    return FlightPlan(name, find_mission(mission or found.mission), found, heading_deg, seed)
 
 
 def fly_and_report(plan: FlightPlan, out: Path) -> Flown:
     """Flies the plan; leaves flight.ulg, report.html and summary.json in `out`."""
+    return _report(plan, out, lambda log_path, show: simulate(plan, log_path, show))
+
+
+def fly_sticks_and_report(plan: FlightPlan, out: Path) -> Flown:
+    """The same with Ugglan's own pipeline; the pilot has a programme of his own, no mission."""
+
+    def by_sticks(log_path: Path, show: Callable[[float, str], None]) -> TruthTrack:
+        return fly_ugglan(
+            plan.heading_deg, plan.seed, log_path, plan.scenario.surroundings, progress=show
+        ).track
+
+    return _report(plan, out, by_sticks)
+
+
+def _report(
+    plan: FlightPlan,
+    out: Path,
+    fly: Callable[[Path, Callable[[float, str], None]], TruthTrack],
+) -> Flown:
     make_writable(out)
     begin = time.monotonic()
     log_path = out / "flight.ulg"
@@ -77,7 +130,7 @@ def fly_and_report(plan: FlightPlan, out: Path) -> Flown:
                 state_before = state
             bar.update(task, completed=time_s, description=state)
 
-        track = simulate(plan, log_path, show)
+        track = fly(log_path, show)
     log = read_flight_log(log_path)
     numbers = summarise(log, track, time.monotonic() - begin)
     summary = Flown(

@@ -30,6 +30,7 @@ from strix.handling.montecarlo import (
 from strix.handling.run import Handling, fly_all, print_handling
 from strix.handling.targets import HEADINGS_DEG, Line, handling_jobs, table
 from strix.scenarios import Outcome
+from strix.vehicles import plant_numbers
 
 TIME_S = grid(2.0)
 
@@ -99,14 +100,24 @@ def test_draws_fill_what_they_are_said_to_fill_and_a_seed_is_one_aircraft() -> N
     for values, low, high in (
         ([d.variation.mass for d in draws], 1.0 - SHARE, 1.0 + SHARE),
         ([d.variation.thrust for d in draws], 1.0 - SHARE, 1.0 + SHARE),
-        *(([d.variation.inertia[i] for d in draws], 1.0 - SHARE, 1.0 + SHARE) for i in range(3)),
         ([d.motor_lag_s for d in draws], *MOTOR_LAG_S),
+        ([d.heading_deg for d in draws], 0.0, 360.0),
     ):
         width = high - low
         assert low <= min(values) < low + 0.01 * width  # missed by 1000 in 1 of 20000 runs,
         assert high - 0.01 * width < max(values) <= high
         # of a uniform mean 4 standard errors: 4 / sqrt(12 x 1000) of the width
         assert abs(np.mean(values) - 0.5 * (low + high)) < 0.037 * width
+
+
+def test_every_drawn_body_can_exist() -> None:
+    """No moment of inertia is larger than the two others together."""
+    inertia = np.array(plant_numbers("Quad5in").inertia_kg_m2)
+    for seed in range(1000):
+        shares = np.array(draw(seed).variation.inertia)
+        assert np.all(np.abs(shares - 1.0) <= SHARE)
+        moments = shares * inertia
+        assert 2.0 * moments.max() <= moments.sum()
 
 
 @pytest.fixture(scope="module")

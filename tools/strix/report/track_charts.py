@@ -35,6 +35,7 @@ def tracks(flight: Comparison) -> list[Chart]:
     paths = _paths(flight)
     places = _places(flight)
     everything = np.concatenate([path.position_ned_m for path in paths] + [np.zeros((1, 3))])
+    everything = everything[np.isfinite(everything).all(axis=1)]  # no place: it is not estimated
     farthest = everything[np.argmax(np.linalg.norm(everything[:, :2], axis=1))]
     bearing_rad = float(np.arctan2(farthest[1], farthest[0]))
     bearing_deg = round(np.degrees(bearing_rad)) % 360
