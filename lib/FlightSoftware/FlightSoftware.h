@@ -327,6 +327,10 @@ class FlightSoftware {
     hash.add(estimator().magBias());
     hash.add(estimator().packedCovariance().elements());
     hash.add(controller_.error());
+    hash.add(controller_.integral().horizontalNed());
+    hash.add(controller_.integral().down());
+    hash.add(controller_.integral().yaw());
+    hash.add(controller_.wrenchEstimate().now());
     hash.add(static_cast<std::uint32_t>(fsm_.state()));
     hash.add(motors_.commands());
     return {time, hash.value(), elapsed(now, lastPass_), overruns()};

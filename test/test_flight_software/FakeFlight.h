@@ -17,7 +17,10 @@ constexpr Mission kLowMission{"low", 0.3F, 500'000, 1, {{{0.1F, -0.1F, 0.3F, 0.1
 
 /// Without integral action, which would rightly ask for ever more of an aircraft that cannot move.
 [[nodiscard]] inline FlightSoftwareConfig lowFlight() {
-  return flightConfig(kQuad5in, kQuad5inGainsNoIntegral, kLowMission, 0.07F);
+  FlightSoftwareConfig config = flightConfig(kQuad5in, kQuad5inGainsNoIntegral, kLowMission, 0.07F);
+  config.mission.end = MissionEnd::Home;
+  config.guidance.returnHeight = 0.1F;  // no climb
+  return config;
 }
 
 /// Takes the sensors' ranges away, to see what the software behind them does with such readings.
@@ -105,8 +108,10 @@ class BasicFakeFlight {
 
 using FakeFlight = BasicFakeFlight<FakeBoard>;
 
-constexpr FlightState kMotorStates[] = {FlightState::Armed, FlightState::Takeoff, FlightState::Hold,
-                                        FlightState::Waypoint, FlightState::Land};
+/// But for the attitude stand, which has a mission and tests of its own.
+constexpr FlightState kMotorStates[] = {FlightState::Armed,  FlightState::Takeoff,
+                                        FlightState::Hold,   FlightState::Waypoint,
+                                        FlightState::Return, FlightState::Land};
 
 [[nodiscard]] inline bool areOff(const EscCommands& commands) {
   for (const float command : commands) {

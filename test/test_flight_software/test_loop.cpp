@@ -110,8 +110,9 @@ void test_a_clock_that_wraps_in_flight_changes_no_bit_of_it() {
   const Script reference(0);
   // The reference itself flew, through all states.
   const std::vector<FlightState> expected{
-      FlightState::Boot, FlightState::Idle,     FlightState::Armed, FlightState::Takeoff,
-      FlightState::Hold, FlightState::Waypoint, FlightState::Hold,  FlightState::Land};
+      FlightState::Boot,    FlightState::Idle,   FlightState::Armed,
+      FlightState::Takeoff, FlightState::Hold,   FlightState::Waypoint,
+      FlightState::Hold,    FlightState::Return, FlightState::Land};
   TEST_ASSERT_TRUE(reference.states.size() >= expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
     TEST_ASSERT_TRUE(reference.states[i] == expected[i]);

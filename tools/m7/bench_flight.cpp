@@ -174,6 +174,7 @@ class HashBench {
     filter_.predict(noise_.vector(0.5F) - Vector3f{0.0F, 0.0F, strix::kGravity},
                     noise_.vector(0.5F), now_);
     for (int i = 0; i < error_.size(); ++i) error_[i] = noise_();
+    for (float& element : remembered_) element = noise_();
     for (float& command : commands_) command = 1400.0F + 100.0F * noise_();
     hash_.add(counter.count([this] { value_ = hashed(); }));
   }
@@ -191,6 +192,7 @@ class HashBench {
     hash.add(filter_.magBias());
     for (const float element : filter_.packedCovariance().elements()) hash.add(element);
     hash.add(error_);
+    for (const float element : remembered_) hash.add(element);
     hash.add(std::uint32_t{4});
     for (const float command : commands_) hash.add(command);
     return hash.value();
@@ -200,6 +202,7 @@ class HashBench {
   Micros now_ = 0;
   strix::ESKF<States> filter_{strix::NavigationConfig()};
   strix::ControlError error_ = strix::ControlError::Zero();
+  std::array<float, 8> remembered_{};  ///< integrals and wrench estimate
   strix::EscCommands commands_{};
   std::uint32_t value_ = 0;
   Counts hash_{"hash of a tick"};
