@@ -15,7 +15,8 @@
 ///   bool readGps(GpsRaw&);
 ///   bool readBattery(BatteryRaw&);      the same; a board that cannot measure it returns false for
 ///   bool readEscStatus(EscRaw&);        ever
-///   std::string_view missionText();     mission.txt as begin() found it on the card; empty: none, and
+///   std::string_view missionText();     mission.txt as begin() found it on the card; empty: none,
+///   and
 ///                                       the mission that is compiled in flies
 ///   void countFaults(SensorFaultCounts&);
 ///                                       fills in the rows of its devices and buses

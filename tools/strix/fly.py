@@ -82,6 +82,11 @@ def make_plan(
             f"--controller {controller}: expected --vehicle {STICKS_VEHICLE}, of whose "
             f"motors the law knows, found {name}"
         )
+    if controller == Controller.STICKS and (mission is not None or not found.of_the_air):
+        raise BadInput(
+            "--controller sticks: expected no mission, and a scenario of the air alone such as "
+            "calm or wind: the pilot flies a programme of his own"
+        )
     if controller == Controller.UGGLAN:
         found = replace(found, settings=(*found.settings, *_UGGLAN_LAW))
     return FlightPlan(name, find_mission(mission or found.mission), found, heading_deg, seed)

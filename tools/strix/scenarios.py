@@ -48,6 +48,11 @@ class Scenario:
     settings: tuple[tuple[str, Setting], ...] = ()  # of the flight software, by configure()
     expected: Outcome = Outcome.LANDS
 
+    @property
+    def of_the_air(self) -> bool:
+        """The aircraft is free and as built; only what surrounds it is special."""
+        return self.surroundings.stand is None and self.variation == AS_BUILT and not self.settings
+
 
 # The stand's magnetometer lies on a battery lead, 4.5 mm from its middle: the 5.5 A of hover make
 # 2e-7 x 5.5 / 0.0045 = 240 uT there, five times the earth's field; the 0.6 of the weight that the

@@ -228,6 +228,23 @@ def test_fly_leaves_its_three_files_and_the_summary(tmp_path: Path) -> None:
     assert "<html" in (out / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize("controller", ["ugglan", "sticks"])
+def test_ugglan_flies_with_its_own_law_and_with_its_own_pipeline(
+    controller: str, tmp_path: Path
+) -> None:
+    """The law at 500 Hz under the LQR's positions; and 50 Hz with a pilot at the sticks."""
+    line = f"fly --vehicle UgglanQ450 --controller {controller} --scenario wind --json --out"
+    result = CliRunner().invoke(app, [*line.split(), str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    printed = json.loads(result.stdout)
+    assert printed["outcome"] == "lands"
+    assert printed["max_tilt_deg"] < 20.0  # 10 deg are asked for, in a wind that asks for 2
+    assert printed["loop_overruns"] == printed["log_drops"] == 0
+    # Without GPS in it the published pipeline knows no place.
+    assert (printed["rms_position_m"] is None) == (controller == "sticks")
+    assert "<html" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
@@ -235,6 +252,16 @@ def test_fly_leaves_its_three_files_and_the_summary(tmp_path: Path) -> None:
         (["--mission", "nowhere"], "expected a file or one of first-flight, "),
         (["--scenario", "storm"], "unknown scenario 'storm'"),
         (["--heading", "nan"], "--heading: expected degrees"),
+        (["--controller", "pid"], "--controller: expected one of lqr, ugglan, sticks, found 'pid'"),
+        (["--controller", "ugglan"], "expected --vehicle UgglanQ450"),
+        (
+            ["--vehicle", "UgglanQ450", "--controller", "sticks", "--mission", "square"],
+            "expected no mission",
+        ),
+        (
+            ["--vehicle", "UgglanQ450", "--controller", "sticks", "--scenario", "heavy"],
+            "a scenario of the air alone",
+        ),
     ],
 )
 def test_a_wrong_option_is_told_in_one_line(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from strix.handling.figures import write_figures
 from strix.handling.flights import (
     Job,
     Kind,
@@ -183,6 +184,7 @@ def test_the_file_has_null_for_what_was_not_measured(
 ) -> None:
     cut = replace(flown[0], cut=True, responses={})
     lines = table("Quad5in", [], targets=True)
+    assert not any(line.met for line in lines)  # nothing was flown
     found = Handling(1, lines, by_badness([cut, *flown[1:]]))
     said = json.loads(json.dumps(found.to_dict(), allow_nan=False))
     assert not said["met"]
@@ -193,3 +195,12 @@ def test_the_file_has_null_for_what_was_not_measured(
     printed = capsys.readouterr().out
     assert "7 of 8 flights pass" in printed
     assert "MISSED" in printed
+
+
+def test_the_figures_are_drawn_the_same_each_time(flown: list[Measured], tmp_path: Path) -> None:
+    first = write_figures(flown, tmp_path / "first")
+    assert [path.name for path in first] == ["control_headings_Quad5in.png", "control_robust.png"]
+    for path in first:
+        again = tmp_path / "again" / path.name
+        write_figures(flown, again.parent)
+        assert path.read_bytes() == again.read_bytes()

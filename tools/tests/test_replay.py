@@ -82,6 +82,23 @@ def test_every_vehicle_and_scenario_replays(tmp_path: Path, vehicle: str, scenar
     assert replay(path).same
 
 
+def test_the_law_and_the_mission_that_flew_are_replayed(tmp_path: Path) -> None:
+    """Ugglan's law, another design of the gains, a mission with every kind of leg."""
+    mission = tmp_path / "kinds.txt"
+    mission.write_text(
+        "takeoff 2 0.5\nspeed 1.5\nleg 3 0 2 30 0 0.8\nattitude 10 0 0 0.5\nhome\n",
+        encoding="utf-8",
+    )
+    path = tmp_path / "flight.ulg"
+    plan = make_plan("UgglanQ450", str(mission), "wind", 40.0, 3, "ugglan")
+    simulate(plan, path, lambda _time_s, _state: None, give_up_s=60.0)
+    log = read_flight_log(path)
+    assert log.topic("flight_config")["attitude_law"][0] == 1
+    assert log.topic("flight_config")["design"][0] == 2
+    assert len(log.topic("esc_status")["timestamp"]) > 150
+    assert replay(path).same
+
+
 def test_one_bit_of_one_input_is_found(flight: Path, tmp_path: Path) -> None:
     content = bytearray(flight.read_bytes())
     imu = records(bytes(content), "sensor_combined")[20_000]
