@@ -6,7 +6,7 @@ SETUP := @$(PYTHON) tools/setup/setup.py
 # The virtual environment without the compiled core, for what does not need it.
 ENVIRONMENT := $(SETUP) environment
 
-.PHONY: help setup fly test pio gains vectors bench footprint determinism fuzz m7 consistency accuracy figures firmware format lint pins clean
+.PHONY: help setup fly test pio gains vectors bench footprint determinism fuzz m7 consistency accuracy handling figures firmware format lint pins clean
 
 help: ## List these verbs
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-11s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -69,10 +69,15 @@ accuracy: ## Score the filter on the recordings in ../shared/data, beside VQF
 	$(SETUP)
 	@$(VENV)/strix accuracy --out out $(ARGS)
 
+handling: ## Measure how both aircraft handle, and 200 flights of aircraft 20 % off (ARGS="--flights 50")
+	$(SETUP)
+	@$(VENV)/strix handling --out out $(ARGS)
+
 figures: ## Draw what each option of the navigation buys, into docs/figures
 	$(SETUP)
 	@$(VENV)/strix options --out docs/figures
 	@$(VENV)/strix gains --check --figures docs/figures
+	@$(VENV)/strix gains --controller ugglan --check --figures docs/figures
 
 firmware: ## Build the firmware for the Teensy 4.1 (needs PlatformIO's registry)
 	$(ENVIRONMENT)

@@ -256,5 +256,51 @@ def gains(
         raise typer.Exit(1)
 
 
+@app.command(epilog="Example: strix handling --flights 200 --out out")
+@says_what_is_wrong
+def handling(
+    flights: Annotated[int, typer.Option(min=0, help="Of the Monte Carlo")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first flight")] = 1,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Processes; all cores when left out")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for handling.json and figures")] = Path("out"),
+    figures: Annotated[Path | None, typer.Option(help="Another folder for the figures")] = None,
+    replay: Annotated[
+        int | None, typer.Option(help="Fly this seed of the Monte Carlo again, and nothing else")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON")] = False,
+) -> None:
+    """Measure steps, hover, wind and robustness in simulation, beside their targets.
+
+    Exits with 1 when a target is missed.
+    """
+    from strix import handling as library
+
+    if replay is not None:
+        flight = library.replay_robust(replay, out)
+        library.print_replay(flight)
+        raise typer.Exit(0 if flight.passes else 1)
+    found = library.run_handling(flights, seed, jobs, out, figures)
+    if as_json:
+        print(json.dumps(found.to_dict()))
+    else:
+        library.print_handling(found)
+    if not found.met:
+        raise typer.Exit(1)
+
+
+@app.command(epilog="Example: strix diagrams --out docs")
+@says_what_is_wrong
+def diagrams(
+    out: Annotated[Path, typer.Option(help="Folder for the pages")] = Path("docs"),
+) -> None:
+    """Draw the state machine and the signals of a control tick from the source."""
+    from strix.diagrams import write_diagrams
+
+    for path in write_diagrams(out):
+        print(path)
+
+
 if __name__ == "__main__":
     app()

@@ -10,5 +10,6 @@ void bindFlight(nanobind::module_& m);
 void bindMissions(nanobind::module_& m);
 void bindMotors(nanobind::module_& m);
 void bindReplay(nanobind::module_& m);
+void bindStates(nanobind::module_& m);
 void bindUgglanFlight(nanobind::module_& m);
 void bindVehicles(nanobind::module_& m);

@@ -10,6 +10,7 @@ NB_MODULE(_core, m) {
   bindMissions(m);
   bindMotors(m);
   bindReplay(m);
+  bindStates(m);
   bindUgglanFlight(m);
   bindVehicles(m);
 }
