@@ -5,6 +5,7 @@
 #include "Board.h"
 #include "Conditions.h"
 #include "Controller.h"
+#include "CorrectionSmoother.h"
 #include "Detectors.h"
 #include "FiniteStateMachine.h"
 #include "FlightLog.h"
@@ -31,6 +32,7 @@ class FlightSoftware {
         sensors_(board, config.sensors),
         startCalibration_(config.startCalibration),
         navigation_(config.navigation),
+        smoother_(config.gpsSmoothing, kControlPeriod),
         battery_(config.vehicle.batteryCells),
         guidance_(config.mission, config.guidance, config.vehicle.mass * kGravity),
         controller_(config.vehicle, config.gains, config.control),
@@ -81,6 +83,7 @@ class FlightSoftware {
     const Micros now = board_.micros();  // the one time stamp of this pass
     const LogTime time = clock_.update(now);
     bool heard = false;
+    bool fixed = false;  // by GPS
 
     if (sensors_.imuUpdate(now)) {
       heard = true;
@@ -117,12 +120,15 @@ class FlightSoftware {
         if (!everArmed_) averageOrigin(raw);
         const GpsSample gps = sensors_.processGPSMeas(raw);
         navigation_.updateGPSMeas(gps.positionNed, gps.velocityNed, now);
+        fixed = true;
       }
       logger_.logGPS(toRecord(time, clock_.at(raw.sampled), raw));
       logAid<AidSource::Gps>(time, estimator().gpsInnovation());
     }
     if (heard) {
+      const VehicleState before = fixed ? navigation_.state() : VehicleState{};
       navigation_.finishPass(now);
+      if (fixed) smoother_.correct(before, navigation_.state());
       if (calibrating() && startCalibration_.done()) finishCalibration(now, time);
     }
     if (controller_.due(now)) controlTick(now, time);
@@ -153,6 +159,9 @@ class FlightSoftware {
   void controlTick(Micros now, LogTime time) {
     VehicleState estimate = navigation_.state();
     estimate.rateBody = controlRate_;
+    smoother_.advance();
+    if (!motors_.armed()) smoother_.clear();  // what stands still has nothing to jump after
+    smoother_.apply(estimate);
     readPower(time);
     updateStateMachine(now, time, estimate);
     const Reference& reference = guidance_.update(now);
@@ -293,7 +302,7 @@ class FlightSoftware {
     setIf(touchDown(now, estimate), condition::kTouchDown);
     setIf(pilot.kill, condition::kKill);
     setIf(!(cosTilt(estimate.attitude) > 0.0F), condition::kUpset);
-    setIf(!config_.fence.contains(estimate.positionNed), condition::kOutsideFence);
+    setIf(!config_.fence.contains(navigation_.state().positionNed), condition::kOutsideFence);
     setIf(!sensors_.imuFresh(now), condition::kImuLost);
     setIf(!navigation_.healthy(), condition::kEstimatorUnhealthy);
     return set;
@@ -326,6 +335,8 @@ class FlightSoftware {
     hash.add(estimator().gyroBias());
     hash.add(estimator().magBias());
     hash.add(estimator().packedCovariance().elements());
+    hash.add(smoother_.position());
+    hash.add(smoother_.velocity());
     hash.add(controller_.error());
     hash.add(controller_.integral().horizontalNed());
     hash.add(controller_.integral().down());
@@ -390,6 +401,7 @@ class FlightSoftware {
   StartCalibration startCalibration_;
   OriginAverage origin_;
   Navigation<States> navigation_;
+  CorrectionSmoother smoother_;
   BatteryMonitor battery_;
   FiniteStateMachine fsm_;
   Guidance guidance_;

@@ -7,6 +7,7 @@
   RUN_TEST(test<18>)
 
 void runAlignmentTests();
+void runCorrectionSmootherTests();
 void runPropagationTests();
 void runUpdateTests();
 void runHeadingTests();

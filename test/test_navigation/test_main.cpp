@@ -12,6 +12,7 @@ void tearDown() {}
 int main() {
   UNITY_BEGIN();
   runAlignmentTests();
+  runCorrectionSmootherTests();
   runPropagationTests();
   runUpdateTests();
   runHeadingTests();

@@ -202,7 +202,7 @@ class HashBench {
   Micros now_ = 0;
   strix::ESKF<States> filter_{strix::NavigationConfig()};
   strix::ControlError error_ = strix::ControlError::Zero();
-  std::array<float, 8> remembered_{};  ///< integrals and wrench estimate
+  std::array<float, 12> remembered_{};  ///< of smoother, integrals and wrench estimate
   strix::EscCommands commands_{};
   std::uint32_t value_ = 0;
   Counts hash_{"hash of a tick"};

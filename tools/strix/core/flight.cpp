@@ -46,11 +46,15 @@ struct FlightOptions {
       : FlightOptions(strix::flightConfig(airframe(vehicle).vehicle, airframe(vehicle).gains,
                                           strix::kFirstFlight, 0.0F)) {}
   explicit FlightOptions(const strix::FlightSoftwareConfig& config)
-      : navigation(config.navigation), control(config.control), guidance(config.guidance) {}
+      : navigation(config.navigation),
+        control(config.control),
+        guidance(config.guidance),
+        gpsSmoothing(config.gpsSmoothing) {}
 
   strix::NavigationConfig navigation;
   strix::ControlConfig control;
   strix::GuidanceConfig guidance;
+  float gpsSmoothing;
   std::size_t design = 0;        ///< of Airframe::designs
   bool reducedObserver = false;  ///< attitude by Ugglan's law
 };
@@ -68,6 +72,7 @@ strix::FlightSoftwareConfig configured(const std::string& vehicle, const strix::
   config.navigation = options->navigation;
   config.control = options->control;
   config.guidance = options->guidance;
+  config.gpsSmoothing = options->gpsSmoothing;
   if (options->reducedObserver) {
     if (frame.observer == nullptr) {
       throw std::invalid_argument(vehicle + " has no gains of the reduced observer");
@@ -195,6 +200,7 @@ void bindOptions(nb::module_& m) {
       .def_rw("navigation", &FlightOptions::navigation)
       .def_rw("control", &FlightOptions::control)
       .def_rw("guidance", &FlightOptions::guidance)
+      .def_rw("gps_smoothing", &FlightOptions::gpsSmoothing, "s")
       .def_rw("design", &FlightOptions::design,
               "Of the gains: 0 integral and lag, 1 no integral, 2 no lag, 3 neither")
       .def_rw("reduced_observer", &FlightOptions::reducedObserver,
