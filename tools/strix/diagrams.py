@@ -58,6 +58,11 @@ NODES = (
     Node("pilot", "the pilot's switches", ()),
     Node("power", "battery and ESCs", ("readPower",)),
     Node("estimate", "where the aircraft is", ("navigation_.state",)),
+    Node(
+        "smooth",
+        "GPS's corrections given back slowly; none on the ground",
+        ("smoother_.advance", "motors_.armed", "smoother_.clear", "smoother_.apply"),
+    ),
     Node("states", "at most one transition; arms, disarms", ("updateStateMachine",)),
     Node("guidance", "where it should be", ("guidance_.update",)),
     Node(
@@ -99,8 +104,9 @@ NODES = (
 SIGNALS = (
     Signal("sensors", "estimate", "Navigation's filter; rates by the gyro filter"),
     Signal("pilot", "states", "arm, start, kill"),
-    Signal("estimate", "states", "VehicleState"),
-    Signal("estimate", "controller", "VehicleState"),
+    Signal("estimate", "smooth", "VehicleState"),
+    Signal("smooth", "states", "VehicleState"),
+    Signal("smooth", "controller", "VehicleState"),
     Signal("power", "allocation", "V"),
     Signal("states", "guidance", "entered state"),
     Signal("states", "gate", "state"),
