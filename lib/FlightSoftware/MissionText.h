@@ -162,90 +162,12 @@ class MissionParser {
   static constexpr Field kSpeed{"M_S", 0.1F, 5.0F, "m/s"};
   static constexpr Field kAngle{"ANGLE_DEG", 1.0F, kMostTiltDeg, "deg"};
 
-  /// One line that says something.
-  constexpr void take() {
-    const std::string_view word = line_.word;
-    if (ended_) return refuseWord("no line after the mission's end");
-    if (word == "takeoff") return takeTakeoff();
-    if (word == "stand") return takeStand();
-    if (word == "leg" || word == "attitude" || word == "speed" || word == "home" ||
-        word == "land") {
-      if (!begun_) return refuseWord("'takeoff HEIGHT_M HOLD_S' first");
-      if (word == "leg") return takeLeg();
-      if (word == "attitude") return takeAttitude();
-      if (word == "speed") return takeSpeed();
-      ended_ = true;
-      parsed_.mission.end = word == "home" ? MissionEnd::Home : MissionEnd::Land;
-      (void)take(word == "home" ? "'home'" : "'land'", std::array<Field, 0>{});
-      return;
-    }
-    refuseWord("'takeoff', 'leg', 'attitude', 'speed', 'home', 'land' or 'stand'");
-  }
-
-  constexpr void takeTakeoff() {
-    if (begun_) return refuseWord("one takeoff, before all legs");
-    begun_ = true;
-    if (!take("'takeoff HEIGHT_M HOLD_S'", std::array<Field, 2>{height_, kHold})) return;
-    parsed_.mission.takeoffHeight = values_[0];
-    parsed_.mission.takeoffHoldTime = mission_text::toMicros(values_[1]);
-  }
-
-  constexpr void takeStand() {
-    if (begun_) return refuseWord("'stand ANGLE_DEG' alone");
-    begun_ = ended_ = true;
-    if (!take("'stand ANGLE_DEG'", std::array<Field, 1>{kAngle})) return;
-    parsed_.mission.standAngle = values_[0] * kDegToRad;
-  }
-
-  constexpr void takeLeg() {
-    const Field north{"NORTH_M", -fence_.radius, fence_.radius, "m"};
-    const Field east{"EAST_M", -fence_.radius, fence_.radius, "m"};
-    if (!take("'leg NORTH_M EAST_M HEIGHT_M TURN_DEG HOLD_S [RADIUS_M]'",
-              std::array<Field, 6>{north, east, height_, kTurn, kHold, kRadius}, 1)) {
-      return;
-    }
-    if (!fence_.contains(values_[0], values_[1], values_[2])) {
-      const char* const begin = line_.numbers[0].data();
-      const std::string_view last = line_.numbers[1];
-      refuse("", "a place up to");
-      parsed_.error.unit = "m from the start";
-      parsed_.error.low = parsed_.error.high = fence_.radius;
-      parsed_.error.found = {begin, static_cast<std::size_t>(last.data() - begin) + last.size()};
-      return;
-    }
-    add({values_[0], values_[1], values_[2], values_[3] * kDegToRad,
-         mission_text::toMicros(values_[4]), LegKind::Waypoint,
-         line_.count == 6 ? values_[5] : 0.0F, speed_});
-  }
-
-  constexpr void takeAttitude() {
-    if (!take("'attitude ROLL_DEG PITCH_DEG YAW_DEG HOLD_S'",
-              std::array<Field, 4>{kRoll, kPitch, kYaw, kTilted})) {
-      return;
-    }
-    add({0.0F, 0.0F, 0.0F, values_[2] * kDegToRad, mission_text::toMicros(values_[3]),
-         LegKind::Attitude, 0.0F, 0.0F, values_[0] * kDegToRad, values_[1] * kDegToRad});
-  }
-
-  constexpr void takeSpeed() {
-    if (take("'speed M_S'", std::array<Field, 1>{kSpeed})) speed_ = values_[0];
-  }
-
-  constexpr void add(const Leg& leg) {
-    Mission& mission = parsed_.mission;
-    if (mission.legCount == Mission::kMaxLegs) {
-      refuse("", "at most 32 legs and attitudes");
-      parsed_.error.foundText = "another";
-      return;
-    }
-    mission.legs[mission.legCount++] = leg;
-  }
-
   /// This line's numbers into values_, each within its limits.
+  /// Stands before its callers: Clang 14 cannot evaluate a template in a constant otherwise.
   /// @param optional  how many of the last ones may be missing
   template <std::size_t Count>
-  constexpr bool take(const char* usage, const std::array<Field, Count>& fields,
-                      std::size_t optional = 0) {
+  constexpr bool takeNumbers(const char* usage, const std::array<Field, Count>& fields,
+                             std::size_t optional = 0) {
     if (line_.count > Count || line_.count + optional < Count) {
       refuse("", usage);
       parsed_.error.foundNumbers = static_cast<int>(line_.count);
@@ -267,6 +189,85 @@ class MissionParser {
       return false;
     }
     return true;
+  }
+
+  /// One line that says something.
+  constexpr void take() {
+    const std::string_view word = line_.word;
+    if (ended_) return refuseWord("no line after the mission's end");
+    if (word == "takeoff") return takeTakeoff();
+    if (word == "stand") return takeStand();
+    if (word == "leg" || word == "attitude" || word == "speed" || word == "home" ||
+        word == "land") {
+      if (!begun_) return refuseWord("'takeoff HEIGHT_M HOLD_S' first");
+      if (word == "leg") return takeLeg();
+      if (word == "attitude") return takeAttitude();
+      if (word == "speed") return takeSpeed();
+      ended_ = true;
+      parsed_.mission.end = word == "home" ? MissionEnd::Home : MissionEnd::Land;
+      (void)takeNumbers(word == "home" ? "'home'" : "'land'", std::array<Field, 0>{});
+      return;
+    }
+    refuseWord("'takeoff', 'leg', 'attitude', 'speed', 'home', 'land' or 'stand'");
+  }
+
+  constexpr void takeTakeoff() {
+    if (begun_) return refuseWord("one takeoff, before all legs");
+    begun_ = true;
+    if (!takeNumbers("'takeoff HEIGHT_M HOLD_S'", std::array<Field, 2>{height_, kHold})) return;
+    parsed_.mission.takeoffHeight = values_[0];
+    parsed_.mission.takeoffHoldTime = mission_text::toMicros(values_[1]);
+  }
+
+  constexpr void takeStand() {
+    if (begun_) return refuseWord("'stand ANGLE_DEG' alone");
+    begun_ = ended_ = true;
+    if (!takeNumbers("'stand ANGLE_DEG'", std::array<Field, 1>{kAngle})) return;
+    parsed_.mission.standAngle = values_[0] * kDegToRad;
+  }
+
+  constexpr void takeLeg() {
+    const Field north{"NORTH_M", -fence_.radius, fence_.radius, "m"};
+    const Field east{"EAST_M", -fence_.radius, fence_.radius, "m"};
+    if (!takeNumbers("'leg NORTH_M EAST_M HEIGHT_M TURN_DEG HOLD_S [RADIUS_M]'",
+                     std::array<Field, 6>{north, east, height_, kTurn, kHold, kRadius}, 1)) {
+      return;
+    }
+    if (!fence_.contains(values_[0], values_[1], values_[2])) {
+      const char* const begin = line_.numbers[0].data();
+      const std::string_view last = line_.numbers[1];
+      refuse("", "a place up to");
+      parsed_.error.unit = "m from the start";
+      parsed_.error.low = parsed_.error.high = fence_.radius;
+      parsed_.error.found = {begin, static_cast<std::size_t>(last.data() - begin) + last.size()};
+      return;
+    }
+    add({values_[0], values_[1], values_[2], values_[3] * kDegToRad,
+         mission_text::toMicros(values_[4]), LegKind::Waypoint,
+         line_.count == 6 ? values_[5] : 0.0F, speed_});
+  }
+
+  constexpr void takeAttitude() {
+    if (!takeNumbers("'attitude ROLL_DEG PITCH_DEG YAW_DEG HOLD_S'",
+                     std::array<Field, 4>{kRoll, kPitch, kYaw, kTilted})) {
+      return;
+    }
+    add({0.0F, 0.0F, 0.0F, values_[2] * kDegToRad, mission_text::toMicros(values_[3]),
+         LegKind::Attitude, 0.0F, 0.0F, values_[0] * kDegToRad, values_[1] * kDegToRad});
+  }
+
+  constexpr void takeSpeed() {
+    if (takeNumbers("'speed M_S'", std::array<Field, 1>{kSpeed})) speed_ = values_[0];
+  }
+
+  constexpr void add(const Leg& leg) {
+    Mission& mission = parsed_.mission;
+    if (mission.legCount == Mission::kMaxLegs) {
+      refuse("", "at most 32 legs and attitudes");
+      parsed_.error.foundText = "another";
+      return;
+    }
+    mission.legs[mission.legCount++] = leg;
   }
 
   constexpr void refuse(const char* field, const char* expected) {

@@ -147,7 +147,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def simulated(folder: Path) -> list[Flight]:
-    """A windy minute of each vehicle."""
+    """A windy minute of each vehicle, or less where it lands before."""
     flights = []
     for vehicle in _core.vehicle_names():
         progress(f"flying {vehicle} for {FLIGHT_S:.0f} s")

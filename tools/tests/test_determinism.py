@@ -82,7 +82,7 @@ def test_every_tick_of_every_flight_is_the_logged_one(
     ]
     for row in outcome.rows:
         assert row.verdict == "same", row
-        assert row.ticks > 29_500  # 60 s at 500 Hz; the first tick comes with the first pass
+        assert row.ticks > 27_500  # 55 s at 500 Hz: Quad5in is down before the minute is over
 
 
 def test_all_builds_write_the_same_log(outcomes: dict[str, Outcome]) -> None:
