@@ -136,7 +136,8 @@ class Controller {
     }
     const float down = clamped(reference_.accelerationNed.z(), config_.acceleration);
     if (position) {
-      const Vector2f level = reference_.accelerationNed.head<2>();
+      // What moves the estimate and not the aircraft is flown against.
+      const Vector2f level = reference_.accelerationNed.head<2>() - state.correctionAcceleration;
       const SinCos heading = doubled(halfReference);
       tilt = tiltFor(shortening(level, config_.acceleration) * toHeading(heading, level), down);
       // How fast that tilt changes, to first order: nose down for more forward.
@@ -320,11 +321,11 @@ class Controller {
   /// False with NaN, infinity or a number beyond any sense, of which the squares overflow.
   [[nodiscard]] static bool plausible(const Reference& r, const VehicleState& s) {
     const float yaw = wrapAngle(r.yaw);  // NaN beyond its domain
-    float sum = s.positionNed.squaredNorm() + s.velocityNed.squaredNorm() +
-                s.rateBody.squaredNorm() + square(s.attitude) + r.positionNed.squaredNorm() +
-                r.velocityNed.squaredNorm() + r.accelerationNed.squaredNorm() +
-                r.jerkNed.squaredNorm() + yaw * yaw + r.yawRate * r.yawRate +
-                r.yawAcceleration * r.yawAcceleration;
+    float sum =
+        s.positionNed.squaredNorm() + s.velocityNed.squaredNorm() + s.rateBody.squaredNorm() +
+        square(s.attitude) + s.correctionAcceleration.squaredNorm() + r.positionNed.squaredNorm() +
+        r.velocityNed.squaredNorm() + r.accelerationNed.squaredNorm() + r.jerkNed.squaredNorm() +
+        yaw * yaw + r.yawRate * r.yawRate + r.yawAcceleration * r.yawAcceleration;
     if (r.mode != ReferenceMode::Position) sum += square(r.attitude) + r.thrust * r.thrust;
     return sum < 1e12F;
   }

@@ -5,8 +5,6 @@
 
 namespace strix {
 
-using Vector2f = Eigen::Matrix<float, 2, 1>;
-
 /// Factor that shortens v to `limit`; 1 when it is no longer than that.
 [[nodiscard]] inline float shortening(const Vector2f& v, float limit) {
   const float square = v.squaredNorm();

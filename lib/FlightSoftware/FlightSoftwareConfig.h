@@ -20,7 +20,7 @@ struct FlightSoftwareConfig {
   SensorConfig sensors{};
   StartCalibrationConfig startCalibration{};
   NavigationConfig navigation{};
-  float gpsSmoothing = 1.0F;      ///< s, in which GPS's corrections reach guidance and control
+  float gpsSmoothing = 0.7F;      ///< s, in which GPS's corrections reach guidance and control
   GyroFilterConfig gyroFilter{};  ///< of the rates that the controller gets
   GuidanceConfig guidance{};
   MotorConfig motors{};

@@ -1,10 +1,11 @@
-/// Three-vectors of float and the cross-product matrix.
+/// Vectors of the plane and of space, and the cross-product matrix.
 #pragma once
 
 #include "EigenCore.h"
 
 namespace strix {
 
+using Vector2f = Eigen::Matrix<float, 2, 1>;
 using Vector3f = Eigen::Matrix<float, 3, 1>;
 using Matrix3f = Eigen::Matrix<float, 3, 3>;
 

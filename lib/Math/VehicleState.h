@@ -13,6 +13,8 @@ struct VehicleState {
   Vector3f velocityNed = Vector3f::Zero();  ///< m/s
   Quaternion attitude;                      ///< body to NED
   Vector3f rateBody = Vector3f::Zero();     ///< rad/s, FRD
+  /// Of the place above, north and east, beside the aircraft's own: while it is being corrected.
+  Vector2f correctionAcceleration = Vector2f::Zero();  ///< m/s^2
 };
 
 /// What a reference asks for.

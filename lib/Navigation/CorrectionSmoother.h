@@ -14,10 +14,11 @@ namespace strix {
 /// ArduPilot's EKF3 have output predictors with gains of their own for this. Where fixes correct to
 /// the same side for long, because an acceleration is measured wrong by a, d would grow to a / w^2:
 /// it is bounded, and what is beyond comes in at once.
+///
+/// d'' is no motion of the aircraft, and known: the controller flies against it, so that the output
+/// stays on the reference while the aircraft moves to where the fixes say it should be.
 class CorrectionSmoother {
  public:
-  using Level = Eigen::Matrix<float, 2, 1>;  ///< north, east
-
   /// @param timeConstant  1/w, s; 0: off    @param period  of advance(), s
   CorrectionSmoother(float timeConstant, float period)
       : frequency_(timeConstant > 0.0F ? 1.0F / timeConstant : 0.0F), period_(period) {}
@@ -37,7 +38,7 @@ class CorrectionSmoother {
 
   /// One period.
   void advance() {
-    velocity_ -= (period_ * frequency_) * (2.0F * velocity_ + frequency_ * position_);
+    velocity_ += period_ * acceleration();
     position_ += period_ * velocity_;
   }
 
@@ -45,26 +46,31 @@ class CorrectionSmoother {
   void apply(VehicleState& state) const {
     state.positionNed.head<2>() += position_;
     state.velocityNed.head<2>() += velocity_;
+    state.correctionAcceleration = acceleration();
   }
 
   // What the output still keeps from the filter.
-  [[nodiscard]] const Level& position() const { return position_; }  ///< m
-  [[nodiscard]] const Level& velocity() const { return velocity_; }  ///< m/s
+  [[nodiscard]] const Vector2f& position() const { return position_; }  ///< m
+  [[nodiscard]] const Vector2f& velocity() const { return velocity_; }  ///< m/s
 
  private:
-  // ours: some three times what fixes of 3 m and 0.3 m/s make of them with 2 s.
-  static constexpr float kMostPosition = 1.0F;  ///< m
+  // ours: some four times what fixes of 3 m and 0.3 m/s make of them with 0.7 s.
+  static constexpr float kMostPosition = 0.5F;  ///< m
   static constexpr float kMostVelocity = 0.5F;  ///< m/s
 
-  [[nodiscard]] static Level bounded(const Level& v, float most) {
+  [[nodiscard]] Vector2f acceleration() const {
+    return -frequency_ * (2.0F * velocity_ + frequency_ * position_);
+  }
+
+  [[nodiscard]] static Vector2f bounded(const Vector2f& v, float most) {
     const float square = v.squaredNorm();
-    return square > most * most ? Level((most / squareRoot(square)) * v) : v;
+    return square > most * most ? Vector2f((most / squareRoot(square)) * v) : v;
   }
 
   float frequency_;  ///< w, rad/s; 0: off
   float period_;     ///< s
-  Level position_ = Level::Zero();
-  Level velocity_ = Level::Zero();
+  Vector2f position_ = Vector2f::Zero();
+  Vector2f velocity_ = Vector2f::Zero();
 };
 
 }  // namespace strix

@@ -104,8 +104,10 @@ class Loop {
     controller.setAchieved(controller.getControl());
   }
 
-  void step(const Reference& reference) {
-    TEST_ASSERT_TRUE(controller.updateControl(now, reference, quad.state()));
+  void step(const Reference& reference) { step(reference, quad.state()); }
+
+  void step(const Reference& reference, const VehicleState& estimate) {
+    TEST_ASSERT_TRUE(controller.updateControl(now, reference, estimate));
     motors_.commandControl(controller.getControl());
     controller.setAchieved(motors_.achieved());
     for (int part = 0; part < 4; ++part) quad.step(motors_.commands(), kControlStepS / 4);

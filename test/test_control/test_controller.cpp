@@ -259,6 +259,48 @@ void test_an_acceleration_fed_forward_gives_that_acceleration() {
   }
 }
 
+/// Largest distance of the estimate from the reference while the estimate of a hovering aircraft is
+/// moved by 0.3 m, critically damped with 1/w = 0.7 s, whether or not the controller is told; m.
+/// The aircraft ends where the estimate says it should, to the fraction of 0.3 m in `left`.
+double strayWhileCorrected(const Flown& flown, float yaw, bool told, double& left) {
+  Loop loop(flown.vehicle, flown.gains, yaw);
+  const Vector3f jump = fromStartFrame({0.24F, 0.18F, 0.0F}, yaw);
+  const float w = 1.0F / 0.7F;
+  double furthest = 0.0;
+  for (int k = 0; k < 5000; ++k) {
+    const float t = static_cast<float>(k) * kControlPeriod;
+    const float decay = std::exp(-w * t);
+    VehicleState estimate = loop.quad.state();
+    estimate.positionNed += (1.0F - (1.0F + w * t) * decay) * jump;
+    estimate.velocityNed += w * w * t * decay * jump;
+    if (told) estimate.correctionAcceleration = w * w * (1.0F - w * t) * decay * jump.head<2>();
+    loop.step(at({0, 0, 0}, yaw), estimate);
+    furthest = std::max(furthest, static_cast<double>(estimate.positionNed.head<2>().norm()));
+  }
+  left = (loop.quad.position + jump.cast<double>()).norm() / 0.3;
+  return furthest;
+}
+
+void test_an_estimate_being_corrected_is_flown_along_with_at_every_heading() {
+  // A correction of 0.3 m begins with w^2 0.3 m = 0.6 m/s^2. Quad5in takes 0.1 s to tilt for that,
+  // and 0.06 m/s are taken back in a third of a second. Nothing told, it waits for the error.
+  // UgglanQ450's motors have twice the lag.
+  struct Flight {
+    Flown flown;
+    double most;
+  };
+  for (const Flight& flight :
+       {Flight{{kQuad5in, kQuad5inGains}, 0.02}, Flight{{kUgglanQ450, kUgglanQ450Gains}, 0.04}}) {
+    for (const float yaw : kHeadings) {
+      double left = 1.0;
+      const double untold = strayWhileCorrected(flight.flown, yaw, false, left);
+      const double told = strayWhileCorrected(flight.flown, yaw, true, left);
+      TEST_ASSERT_TRUE(told < flight.most && told < 0.5 * untold);
+      TEST_ASSERT_TRUE(left < 0.01);
+    }
+  }
+}
+
 void test_control_runs_500_times_a_second_in_a_loop_of_any_pace() {
   for (const Micros pass : {Micros{100}, Micros{1000}, Micros{1400}, Micros{1999}}) {
     Controller controller(kQuad5in, kPlainDesign, unfiltered());
@@ -275,12 +317,13 @@ void test_control_runs_500_times_a_second_in_a_loop_of_any_pace() {
 
 void test_an_estimate_that_is_not_a_number_commands_nothing_and_is_counted() {
   constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-  VehicleState bad[5];
+  VehicleState bad[6];
   bad[0].positionNed.x() = kNaN;
   bad[1].velocityNed.y() = kNaN;
   bad[2].attitude.w = kNaN;
   bad[3].attitude.z = kNaN;
   bad[4].rateBody.z() = std::numeric_limits<float>::infinity();
+  bad[5].correctionAcceleration.x() = kNaN;
   Controller controller(kQuad5in, kPlainDesign, unfiltered());
   controller.reset(0);
   Micros now = 0;
@@ -330,6 +373,7 @@ void runControllerTests() {
   RUN_TEST(test_a_shove_is_recovered_from);
   RUN_TEST(test_a_ramp_is_followed_closely_at_every_heading);
   RUN_TEST(test_an_acceleration_fed_forward_gives_that_acceleration);
+  RUN_TEST(test_an_estimate_being_corrected_is_flown_along_with_at_every_heading);
   RUN_TEST(test_control_runs_500_times_a_second_in_a_loop_of_any_pace);
   RUN_TEST(test_an_estimate_that_is_not_a_number_commands_nothing_and_is_counted);
   RUN_TEST(test_the_log_can_tell_reference_error_and_achieved_wrench);

@@ -49,13 +49,13 @@ class Kind(StrEnum):
 
 
 # The longer the aircraft waits, the better it knows its start: of GPS's 3 m, 20 s of fixes leave
-# 0.22 m north and east, 60 s 0.13 m, and that is in every place it flies to. The other flights are
+# 0.22 m north and east, 90 s 0.10 m, and that is in every place it flies to. The other flights are
 # not about the place; half of the usual time is enough for the start-up calibration.
 ARM_AFTER_S = {
     Kind.ATTITUDE: ARM_AT_S,
     Kind.PLACE: ARM_AT_S,
-    Kind.HOVER: 3.0 * ARM_AT_S,
-    Kind.WIND: 3.0 * ARM_AT_S,
+    Kind.HOVER: 4.5 * ARM_AT_S,
+    Kind.WIND: 4.5 * ARM_AT_S,
     Kind.ROBUST: 0.5 * ARM_AT_S,
 }
 

@@ -25,7 +25,7 @@ VEHICLES = {"Quad5in": True, "UgglanQ450": False}  # with targets, or told only
 WORST = 10
 NOTE = """\
 Attitude is the truth; place is the estimate, unless it says truth. Rise is from
-10 to 90 %. Hovers are armed after 60 s of GPS fixes. Four headings: the
+10 to 90 %. Hovers are armed after 90 s of GPS fixes. Four headings: the
 aircraft's own noise the same at each, GPS without noise; spread of the rise
 about its mean, and the largest distance of two responses at any time, in % of
 the step.

@@ -48,8 +48,8 @@ def handling_jobs(vehicle: str, seed: int, repeats: int = REPEATS) -> list[Job]:
     return quiet + [
         Job(kind, vehicle, heading_deg, seed + repeat * len(HEADINGS_DEG) + i)
         for kind in kinds
-        # GPS's errors in a hover of 30 s are few and long: it takes more of them for a mean.
-        for repeat in range(2 * repeats if kind is Kind.HOVER else repeats)
+        # GPS's errors in a hover of a minute are few and long: it takes more of them for a mean.
+        for repeat in range(4 * repeats if kind is Kind.HOVER else repeats)
         for i, heading_deg in enumerate(HEADINGS_DEG)
     ]
 
