@@ -257,7 +257,7 @@ class Controller {
     if (reference_.mode != ReferenceMode::Position) return Vector2f::Zero();
     const Vector2f integral = toHeading(heading_, integral_.horizontalNed());
     const auto& [right, forward] = toTilt_;
-    const Vector2f tilt{
+    Vector2f tilt{
         -right.position * error_[1] - right.velocity * error_[4] - right.integral * integral.y(),
         -forward.position * error_[0] - forward.velocity * error_[3] -
             forward.integral * integral.x()};

@@ -64,8 +64,9 @@ class ReducedObserverAxis {
     const float b4 = motorTimeConstant + period * stiffness;
     b1_ = motorTimeConstant / b4;
     b2_ = -a * period * stiffness / b4;
-    b3_ = period / b4;
-    share_ = 1.0F / (1.0F + gains.torque * b3_);
+    const float b3 = period / b4;
+    b3_ = b3;
+    share_ = 1.0F / (1.0F + gains.torque * b3);
   }
 
   void reset() {

@@ -34,7 +34,7 @@ class SmoothReference {
   /// How fast an offset may die out. The limits are on lengths, of a place on that of its
   /// horizontal part; `vertical` is the rest of a place.
   struct Limit {
-    float most;
+    float most = 0.0F;
     float vertical = 0.0F;
   };
 

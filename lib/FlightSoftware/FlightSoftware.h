@@ -15,6 +15,7 @@
 #include "MissionText.h"
 #include "Motors.h"
 #include "Navigation.h"
+#include "PowerReadings.h"
 #include "Sensors.h"
 #include "Version.h"
 
@@ -180,18 +181,8 @@ class FlightSoftware {
     if (faultLog_.run(now)) logFaults(now, time);
   }
 
-  /// Battery and ESCs, where they answer.
   void readPower(LogTime time) {
-    BatteryRaw battery;
-    if (board_.readBattery(battery)) {
-      battery_.add(battery);
-      logger_.log(toRecord(time, clock_.at(battery.sampled), battery));
-    }
-    EscRaw escs;
-    if (board_.readEscStatus(escs)) {
-      battery_.add(escs);
-      logger_.log(toRecord(time, clock_.at(escs.sampled), escs));
-    }
+    strix::readPower(board_, clock_, time, battery_, logger_);
     motors_.setBatteryVoltage(battery_.voltage());
   }
 

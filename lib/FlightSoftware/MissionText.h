@@ -111,9 +111,13 @@ struct Line {
   return nullptr;
 }
 
-[[nodiscard]] constexpr Micros toMicros(float seconds) {
-  return static_cast<Micros>(seconds * 1e6F + 0.5F);
+/// To the nearest; of a value that is not below 0.
+[[nodiscard]] constexpr std::uint32_t rounded(float value) {
+  // std::lround is not constexpr. NOLINTNEXTLINE(bugprone-incorrect-roundings)
+  return static_cast<std::uint32_t>(value + 0.5F);
 }
+
+[[nodiscard]] constexpr Micros toMicros(float seconds) { return rounded(seconds * 1e6F); }
 
 }  // namespace mission_text
 
@@ -338,7 +342,7 @@ class MissionErrorText {
 
   /// With one decimal where there is one: all limits are such numbers.
   MissionErrorText& add(float number) {
-    auto tenths = static_cast<std::uint32_t>((number < 0.0F ? -number : number) * 10.0F + 0.5F);
+    std::uint32_t tenths = mission_text::rounded((number < 0.0F ? -number : number) * 10.0F);
     const std::uint32_t tenth = tenths % 10U;
     tenths /= 10U;
     std::array<char, 10> digits{};

@@ -20,6 +20,7 @@
 #include "FlightLog.h"
 #include "Logger.h"
 #include "Motors.h"
+#include "PowerReadings.h"
 #include "ReducedObserver.h"
 #include "Sensors.h"
 #include "StartCalibration.h"
@@ -135,18 +136,7 @@ class UgglanFlight {
       height_ = sensors_.processAltMeas(raw);
       logger_.logAlt(toRecord(time, clock_.at(raw.sampled), raw));
     }
-    if (power_.run(now)) {
-      BatteryRaw battery;
-      if (board_.readBattery(battery)) {
-        battery_.add(battery);
-        logger_.log(toRecord(time, clock_.at(battery.sampled), battery));
-      }
-      EscRaw escs;
-      if (board_.readEscStatus(escs)) {
-        battery_.add(escs);
-        logger_.log(toRecord(time, clock_.at(escs.sampled), escs));
-      }
-    }
+    if (power_.run(now)) readPower(board_, clock_, time, battery_, logger_);
   }
 
   /// Aligns the filter with what the still aircraft showed.

@@ -60,7 +60,7 @@ class Allocation {
   /// where that would help the others. With more than four rotors: of what the pseudo-inverse can
   /// express, which moves no thrust to where it changes nothing.
   [[nodiscard]] Squares solve(const Wrench& wanted) const {
-    Shares shares;
+    Shares shares;  // NOLINT(cppcoreguidelines-pro-type-member-init): the loop sets every one
     Squares squares;
     bool inside = true;
     for (std::size_t i = 0; i < Rotors; ++i) {

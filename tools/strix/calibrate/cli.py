@@ -7,7 +7,7 @@ import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, ParamSpec
+from typing import TYPE_CHECKING, Annotated, ParamSpec
 
 import numpy as np
 import typer
@@ -18,6 +18,9 @@ from strix.calibrate.readings import Readings
 from strix.command import says_what_is_wrong
 from strix.errors import BadInput
 from strix.flightlog import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 P = ParamSpec("P")
 
@@ -201,7 +204,9 @@ def _finish(
 ) -> None:
     """Draw, write, tell."""
     source = header.source_of(command, log)
-    figure = _draw(command, log, found, out)
+    figure = draw_into(
+        out / f"calibrate_{command}.png", f"strix calibrate {command} {log.name}", found.draw
+    )
     members = found.members()
     if write is not None:
         header.write_members(write, members, source)
@@ -217,18 +222,19 @@ def _finish(
     print(figure)
 
 
-def _draw(command: str, log: Path, found: Result, out: Path) -> Path:
+def draw_into(path: Path, title: str, draw: Callable[[Figure], None]) -> Path:
+    """A figure as PNG."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    path = out / f"calibrate_{command}.png"
     figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     FigureCanvasAgg(figure)
-    found.draw(figure)
-    figure.suptitle(f"strix calibrate {command} {log.name}")
+    draw(figure)
+    figure.suptitle(title)
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=110, metadata={"Software": None})
     except OSError as error:
-        raise BadInput(f"--out {out}: expected to write there, found: {error.strerror}") from None
+        expected = f"--out {path.parent}: expected to write there"
+        raise BadInput(f"{expected}, found: {error.strerror}") from None
     return path

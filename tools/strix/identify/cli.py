@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import typer
 
-from strix.calibrate.cli import says_what_is_missing
+from strix.calibrate.cli import draw_into, says_what_is_missing
 from strix.errors import BadInput
 
 if TYPE_CHECKING:
@@ -125,26 +125,11 @@ def inertia(
 
 def _finish(command: str, source: Path, found: Result, out: Path, as_json: bool) -> None:
     """Draw and tell."""
-    figure = _draw(command, source, found, out)
+    figure = draw_into(
+        out / f"identify_{command}.png", f"strix identify {command} {source.name}", found.draw
+    )
     if as_json:
         print(json.dumps({**found.to_dict(), "figure": str(figure)}))
         return
     print("\n".join(found.sentences()))
     print(figure)
-
-
-def _draw(command: str, source: Path, found: Result, out: Path) -> Path:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    path = out / f"identify_{command}.png"
-    figure = Figure(figsize=(11.0, 6.0), layout="constrained")
-    FigureCanvasAgg(figure)
-    found.draw(figure)
-    figure.suptitle(f"strix identify {command} {source.name}")
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=110, metadata={"Software": None})
-    except OSError as error:
-        raise BadInput(f"--out {out}: expected to write there, found: {error.strerror}") from None
-    return path
