@@ -22,7 +22,9 @@ std::vector<Topic> recorded(FakeFlight& flight) {
   std::vector<Topic> found;
   for (std::size_t at = 0;; ++at) {
     at = bytes.find({header.data(), header.size()}, at);
-    if (at == std::string::npos || at + header.size() + kPayloadSize < Topic >> bytes.size()) break;
+    if (at == std::string::npos) break;
+    const std::size_t end = at + header.size() + kPayloadSize<Topic>;
+    if (end > bytes.size()) break;
     Topic record{};
     std::memcpy(static_cast<void*>(&record), &bytes[at + header.size()], kPayloadSize<Topic>);
     found.push_back(record);
