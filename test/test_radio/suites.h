@@ -2,3 +2,4 @@
 
 void runReceiverTests();
 void runRadioLinkTests();
+void runChannelMapTests();

@@ -9,6 +9,7 @@ int main() {
   UNITY_BEGIN();
   runReceiverTests();
   runRadioLinkTests();
+  runChannelMapTests();
   UNITY_END();
   return 0;
 }
