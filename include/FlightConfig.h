@@ -11,8 +11,6 @@ namespace strix {
 /// The airframe src/main.cpp flies.
 constexpr Airframe kFlown{kQuad5in, kQuad5inGains, kQuad5inDesigns};
 
-/// Magnetic declination where you fly, east positive: look it up for your field.
-constexpr float kDeclination = 4.0F * kDegToRad;
 
 /// Age of an MTK3333's fix when its sentence has arrived; ArduPilot assumes the same of a receiver
 /// it does not know.
@@ -30,7 +28,7 @@ constexpr Micros kImuPeriod = 888;
 [[nodiscard]] inline FlightSoftwareConfig flightConfig(const Vehicle& vehicle, const Gains& gains,
                                                        const Mission& mission, float declination) {
   FlightSoftwareConfig config{vehicle, gains, mission};
-  config.declination = declination;
+  config.parameters.declination = declination / kDegToRad;
   config.sensors.mag.sensorToBody = magSensorToBody();
   config.navigation.gpsDelay = kGpsDelay;
   config.navigation.gpsPositionSigma = 3.0F;  // m and m/s, an MTK3333 under open sky
@@ -58,8 +56,8 @@ inline void useRealSensors(SensorConfig& sensors, const AircraftCalibration& fou
 
 /// What src/main.cpp flies.
 [[nodiscard]] inline FlightSoftwareConfig flightConfig() {
-  FlightSoftwareConfig config =
-      flightConfig(kFlown.vehicle, kFlown.gains, kFirstFlight, kDeclination);
+  FlightSoftwareConfig config = flightConfig(kFlown.vehicle, kFlown.gains, kFirstFlight,
+                                             Parameters{}.declination * kDegToRad);
   useRealSensors(config.sensors, kCalibration);
   return config;
 }

@@ -10,6 +10,7 @@
 #include "FlightSoftware.h"
 #include "PowerUpChoice.h"
 
+#include "board/Faults.h"
 #include "board/TeensyBoard.h"
 
 // The board's ESCs are driven by pulse width; for ESCs on I2C the board needs EscI2c in place of
@@ -76,12 +77,6 @@ std::size_t toTerminal(const char* text, std::size_t count) {
   return room == 0 ? 0 : Serial.write(text, std::min(count, room));
 }
 
-[[noreturn]] void restart() {
-  SCB_AIRCR = 0x05FA0004;  // SYSRESETREQ, ARMv7-M Architecture Reference Manual B3.2.6
-  for (;;) {
-  }
-}
-
 }  // namespace
 
 void setup() {
@@ -89,6 +84,7 @@ void setup() {
   if (flying) {
     flight.setup();
   } else {
+    if (CrashReport) Serial.print(CrashReport);  // of a fault before this start; told once
     checkout.begin();
   }
 }
@@ -99,7 +95,8 @@ void loop() {
     return;
   }
   checkout.step([] { return Serial.read(); }, toTerminal);
-  if (checkout.rebootAsked()) restart();
+  board.feedWatchdog();
+  if (checkout.rebootAsked()) strix::restart();
 }
 
 /// Called by the core after each pass and by libraries that wait: nothing of it is used here.

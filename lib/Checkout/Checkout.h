@@ -33,7 +33,7 @@ class Checkout {
         axes_(out_),
         table_(out_, pins, rates, limitsOf(config)),
         record_(config.sensors.accelRange, config.sensors.gyroRange, config.sensors.magRange),
-        cosLevel_(cosine(config.armTilt)) {}
+        cosLevel_(cosine(config.parameters.armTilt * kDegToRad)) {}
 
   /// Starts the board. Takes seconds, as FlightSoftware::setup does.
   void begin() {

@@ -29,6 +29,9 @@ class Trajectory {
     positionTime_ = 0;
   }
 
+  /// From the next target on.
+  void setLimits(const TrajectoryLimits& limits) { limits_ = usual_ = limits; }
+
   /// From the next target on. @param horizontal  m/s; zero: the usual one
   void setSpeed(float horizontal) {
     limits_.speedHorizontal = horizontal > 0.0F ? horizontal : usual_.speedHorizontal;

@@ -19,9 +19,13 @@ enum class FlightState : std::uint8_t {
   Safe,
   AttitudeStand,  ///< fixed to a gimbal, turning through a sequence of attitudes
   Return,         ///< on the way home
+  Manual,         ///< the pilot's sticks fly, with the help of his mode
+  Guided,         ///< positions by telemetry are flown
+  Blind,          ///< down without an IMU, on the model of the aircraft, for seconds
+  MotorTest,      ///< one motor turns, on the bench
 };
 
-constexpr std::size_t kStateCount = 10;
+constexpr std::size_t kStateCount = 14;
 
 struct StateProperties {
   FlightState state;
@@ -41,6 +45,10 @@ constexpr std::array<StateProperties, kStateCount> kStates{{
     {FlightState::Safe, "SAFE", false, false},
     {FlightState::AttitudeStand, "ATTITUDE_STAND", true, true},
     {FlightState::Return, "RETURN", true, true},
+    {FlightState::Manual, "MANUAL", true, true},
+    {FlightState::Guided, "GUIDED", true, true},
+    {FlightState::Blind, "BLIND", true, true},
+    {FlightState::MotorTest, "MOTOR_TEST", true, false},
 }};
 
 [[nodiscard]] constexpr const StateProperties& propertiesOf(FlightState state) {
@@ -55,8 +63,15 @@ template <class... States>
   return static_cast<StateSet>(((1U << static_cast<unsigned>(states)) | ...));
 }
 
-constexpr StateSet kFlying = in(FlightState::Takeoff, FlightState::Hold, FlightState::Waypoint,
-                                FlightState::Land, FlightState::Return);
-constexpr StateSet kMotorsOn = kFlying | in(FlightState::Armed, FlightState::AttitudeStand);
+constexpr StateSet kFlying =
+    in(FlightState::Takeoff, FlightState::Hold, FlightState::Waypoint, FlightState::Land,
+       FlightState::Return, FlightState::Manual, FlightState::Guided, FlightState::Blind);
+constexpr StateSet kMotorsOn =
+    kFlying | in(FlightState::Armed, FlightState::AttitudeStand, FlightState::MotorTest);
+/// Flown by a plan, whose maker may be far away.
+constexpr StateSet kAutomatic = in(FlightState::Takeoff, FlightState::Hold, FlightState::Waypoint,
+                                   FlightState::Return, FlightState::Guided);
+/// Of these, those that may turn home.
+constexpr StateSet kUnderWay = in(FlightState::Hold, FlightState::Waypoint, FlightState::Guided);
 
 }  // namespace strix

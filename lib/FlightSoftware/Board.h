@@ -16,38 +16,58 @@
 ///   bool readBattery(BatteryRaw&);      the same; a board that cannot measure it returns false for
 ///   bool readEscStatus(EscRaw&);        ever
 ///   std::string_view missionText();     mission.txt as begin() found it on the card; empty: none,
-///   and
-///                                       the mission that is compiled in flies
+///                                       and the mission that is compiled in flies
 ///   void countFaults(SensorFaultCounts&);
 ///                                       fills in the rows of its devices and buses
-///   PilotSwitches readPilot();          the pilot's switches as they are now
-///   PilotSticks readSticks();           the pilot's sticks as they are now
+///   PilotSwitches readPilot();          the switches on the aircraft as they are now
+///   void beginRadio(RadioProtocol);     once, after begin(): which receiver is connected
+///   bool readRadio(RadioChannels&);     true and filled when a frame has come
 ///   void writeEsc(const EscCommands&);  M1..M4 in the vehicle's command unit; takes effect at the
 ///                                       next ESC frame
+///   void feedWatchdog();                each control tick; a board whose loop stops restarts, and
+///                                       its motors have stopped by then
+///   ResetStatus resetStatus();          why it started
+///   void rememberMotors(bool on);       kept across a restart, for resetStatus()
+///   static constexpr std::size_t kStorageBytes;  that survive power-off
+///   void readStorage(std::size_t offset, std::uint8_t* data, std::size_t size);
+///   bool writeStorage(std::size_t offset, const std::uint8_t* data, std::size_t size);
+///                                       with the motors off, a few bytes at a time: may take long
 ///   Card& card();                       the log's block device (lib/Logger/BlockDevice.h)
 ///   using Card = ...;
 #pragma once
 
+#include "RadioChannels.h"
 #include "RawSamples.h"
 #include "SensorFaults.h"
 #include "Vehicle.h"
 
 namespace strix {
 
-/// Switch positions. Arming is an edge the state machine looks for, not a level.
+/// Switches wired to the aircraft. Arming is an edge, not a level.
 struct PilotSwitches {
   bool arm = false;
   bool kill = false;   ///< motors off now, whatever else
   bool start = false;  ///< begin the mission
 };
 
-/// Stick positions. Without a receiver, or when it is lost, they are not valid.
-struct PilotSticks {
-  float roll = 0.0F;      ///< -1 to 1, right positive
-  float pitch = 0.0F;     ///< -1 to 1, pulled back positive: nose up
-  float yaw = 0.0F;       ///< -1 to 1, right positive
-  float throttle = 0.0F;  ///< 0 to 1
-  bool valid = false;
+/// What a radio receiver speaks; the numbers of parameter RC_PROTOCOL.
+enum class RadioProtocol : std::uint8_t { None, Ibus, Sbus, Crsf };
+
+/// Why the processor started.
+namespace reset {
+constexpr std::uint32_t kPowerUp = 1U << 0U;
+constexpr std::uint32_t kPin = 1U << 1U;
+constexpr std::uint32_t kLockup = 1U << 2U;
+constexpr std::uint32_t kSoftware = 1U << 3U;
+constexpr std::uint32_t kWatchdog = 1U << 4U;
+constexpr std::uint32_t kDebugger = 1U << 5U;
+constexpr std::uint32_t kTemperature = 1U << 6U;
+constexpr std::uint32_t kOther = 1U << 7U;
+}  // namespace reset
+
+struct ResetStatus {
+  std::uint32_t causes = reset::kPowerUp;
+  bool motorsWereOn = false;  ///< when it stopped: it was a restart in flight
 };
 
 /// Devices that answered with the right identity at start.

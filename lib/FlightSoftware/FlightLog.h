@@ -9,7 +9,10 @@
 #include "Mission.h"
 #include "Motors.h"
 #include "Navigation.h"
+#include "PilotInput.h"
+#include "RadioChannels.h"
 #include "Sensors.h"
+#include "VehicleCommand.h"
 
 namespace strix {
 
@@ -46,6 +49,38 @@ namespace strix {
   return {time, switchPosition(pilot.arm), switchPosition(pilot.kill), switchPosition(pilot.start)};
 }
 
+[[nodiscard]] inline topic::InputRc toRecord(LogTime time, const RadioChannels& channels) {
+  return {time, channels.pulse, channels.count, static_cast<std::uint8_t>(channels.failsafe),
+          static_cast<std::uint8_t>(channels.frameLost)};
+}
+
+[[nodiscard]] inline topic::VehicleCommand toRecord(LogTime time, const VehicleCommand& command,
+                                                    bool accepted) {
+  return {time,
+          command.values,
+          command.time,
+          command.index,
+          static_cast<std::uint8_t>(command.kind),
+          static_cast<std::uint8_t>(command.source),
+          command.detail,
+          static_cast<std::uint8_t>(accepted)};
+}
+
+[[nodiscard]] inline topic::ManualControlSetpoint toRecord(LogTime time, const PilotInput& input,
+                                                           PilotMode effective) {
+  return {time,
+          input.roll,
+          input.pitch,
+          input.yaw,
+          input.throttle,
+          static_cast<std::uint8_t>(input.mode),
+          static_cast<std::uint8_t>(effective),
+          switchPosition(input.arm),
+          switchPosition(input.kill),
+          switchPosition(input.start),
+          static_cast<std::uint8_t>(input.valid)};
+}
+
 [[nodiscard]] inline topic::FlightConfig toRecord(LogTime time, const FlightSoftwareConfig& config,
                                                   const SensorSet& found) {
   const std::array<bool, 5> devices{found.imu, found.mag, found.alt, found.gps, found.card};
@@ -54,7 +89,7 @@ namespace strix {
   const Mission& mission = config.mission;
   const bool reducedObserver = config.control.reducedObserver != nullptr;
   return {time,
-          config.declination,
+          config.parameters.declination * kDegToRad,
           mission.takeoffHeight,
           mission.takeoffHoldTime,
           mission.standAngle,

@@ -5,18 +5,24 @@
 #include "Board.h"
 #include "Conditions.h"
 #include "Controller.h"
-#include "CorrectionSmoother.h"
 #include "Detectors.h"
+#include "Estimation.h"
 #include "FiniteStateMachine.h"
-#include "FlightLog.h"
+#include "FlightRecorder.h"
 #include "FlightSoftwareConfig.h"
+#include "FlightStatus.h"
 #include "Guidance.h"
+#include "Hazards.h"
 #include "Logger.h"
 #include "MissionText.h"
+#include "MissionUpload.h"
 #include "Motors.h"
 #include "Navigation.h"
+#include "ParameterStore.h"
+#include "Pilot.h"
 #include "PowerReadings.h"
 #include "Sensors.h"
+#include "StatusReport.h"
 #include "Version.h"
 
 namespace strix {
@@ -30,155 +36,201 @@ class FlightSoftware {
   FlightSoftware(Board& board, const FlightSoftwareConfig& config)
       : board_(board),
         config_(config),
-        sensors_(board, config.sensors),
-        startCalibration_(config.startCalibration),
-        navigation_(config.navigation),
-        smoother_(config.gpsSmoothing, kControlPeriod),
+        store_(board),
+        logger_(board.card()),
+        recorder_(logger_),
+        estimation_(board, config, logger_, clock_),
         battery_(config.vehicle.batteryCells),
-        guidance_(config.mission, config.guidance, config.vehicle.mass * kGravity),
+        guidance_(config.mission, config.guidance, weight()),
         controller_(config.vehicle, config.gains, config.control),
         motors_(config.vehicle, config.motors),
-        gyroFilter_(config.gyroFilter, 1e6F / static_cast<float>(config.sensors.imuPeriod),
-                    static_cast<float>(Controller::kRateHz), config.vehicle.motorTimeConstant),
-        logger_(board.card()),
         touchDown_(config.touchDown.duration),
         hover_(config.hover.duration),
-        wrongConfig_((sensors_.mountingValid() ? 0U : prearm::kMounting) |
-                     (gyroFilter_.valid() ? 0U : prearm::kGyroFilter) |
-                     (motors_.valid() ? 0U : prearm::kLayout) |
-                     (isFlyable(config.mission, config.fence) ? 0U : prearm::kMission)),
-        cosArmTilt_(cosine(config.armTilt)) {}
+        wrongConfig_((sensors().mountingValid() ? 0U : prearm::kMounting) |
+                     (estimation_.gyroFilter().valid() ? 0U : prearm::kGyroFilter) |
+                     (motors_.valid() ? 0U : prearm::kLayout)) {
+    applyParameters();
+  }
 
   /// Starts the board and the log. Start-up calibration follows in the loop, in state BOOT.
   void setup() {
     found_ = board_.begin();
-    const Micros now = board_.micros();
-    lastPass_ = now;
-    const LogTime time = clock_.update(now);
-    sensors_.start(now);
-    controller_.reset(now);
+    reset_ = board_.resetStatus();
+    board_.rememberMotors(false);
+    const LoadReport stored = store_.load(config_.parameters, key_);
+    const bool damaged = stored.damaged || stored.refused > 0;
+    if (damaged) wrongConfig_ |= prearm::kParameters;
+    if (reset_.motorsWereOn) wrongConfig_ |= prearm::kRestarted;
+    applyParameters();
+    board_.beginRadio(static_cast<RadioProtocol>(config_.parameters.radioProtocol));
+    now_ = board_.micros();
+    lastPass_ = now_;
+    time_ = clock_.update(now_);
+    estimation_.start(now_);
+    controller_.reset(now_);
     motors_.disarm();
     motors_.writeESC(board_);
-    hover_.reset(now);
-    touchDown_.reset(now);
-    entered_ = now;
-    Micros phase = 0;  // each in a control tick of its own
-    for (PeriodicTask* task : {&stateLog_, &switchLog_, &stdLog_, &statusLog_, &controlLog_,
-                               &faultLog_, &faultRecord_}) {
-      phase += periodFromHz(Controller::kRateHz);
-      task->start(now + phase);
+    hover_.reset(now_);
+    touchDown_.reset(now_);
+    entered_ = now_;
+    hazards_.start(now_);
+    recorder_.start(now_);
+    stateLog_.start(now_ + 8 * periodFromHz(Controller::kRateHz));
+    logger_.begin(time_, {config_.vehicle.name,
+                          Board::kName,
+                          kVersion,
+                          kGitCommit,
+                          board_.bootId(),
+                          {kParameterCount, &parameterForLog, this}});
+    logger_.log(topic::BootStatus{time_, reset_.causes, reset_.motorsWereOn,
+                                  static_cast<std::uint8_t>(damaged        ? 2
+                                                            : stored.empty ? 1
+                                                                           : 0)});
+    if (reset_.motorsWereOn) {
+      recorder_.say(ulog::LogLevel::Error, time_, "restarted while the motors were on: disarmed");
     }
-    logger_.begin(time,
-                  {config_.vehicle.name, Board::kName, kVersion, kGitCommit, board_.bootId()});
-    loadMission(time);
-    const Mission& mission = config_.mission;
-    logger_.log(toRecord(time, config_, found_));
-    for (std::size_t i = 0; i < mission.legCount && i < Mission::kMaxLegs; ++i) {
-      logger_.log(toRecord(time, mission.legs[i]));
-    }
+    loadMission();
+    logMission();
   }
 
-  /// One pass. Nothing in it waits. Only a reading or a control tick changes anything, and both are
-  /// logged with the time of their pass: from those a replay makes the same passes again.
+  /// One pass. Nothing in it waits. Only a reading, a control tick or a command changes anything,
+  /// and all are logged with the time of their pass: from those a replay makes the same passes
+  /// again.
   void loop() {
-    const Micros now = board_.micros();  // the one time stamp of this pass
-    const LogTime time = clock_.update(now);
-    bool heard = false;
-    bool fixed = false;  // by GPS
-
-    if (sensors_.imuUpdate(now)) {
-      heard = true;
-      const ImuRaw& raw = sensors_.getIMUMeas();
-      const ImuSample imu = sensors_.processIMUMeas(raw);
-      startCalibration_.addImu(imu.sampled, imu.accel, imu.gyro);  // until it is done;
-      navigation_.predict(imu.accel, imu.gyro, imu.sampled);       // from then on
-      navigation_.updateTiltMeas(imu.accel);
-      controlRate_ = gyroFilter_.update(estimator().state().rateBody);
-      logger_.logIMU(toRecord(time, clock_.at(raw.sampled), raw));
-      logAid<AidSource::Tilt>(time, estimator().tiltInnovation());
-    }
-    if (sensors_.magUpdate(now)) {
-      heard = true;
-      const MagRaw& raw = sensors_.getMagMeas();
-      const Vector3f field = sensors_.processMagMeas(raw, motors_.throttle());
-      startCalibration_.addMag(field);
-      navigation_.updateMagMeas(field, now);
-      logger_.logMag(toRecord(time, clock_.at(raw.sampled), raw));
-      logAid<AidSource::Magnetometer>(time, estimator().magInnovation());
-    }
-    if (sensors_.altUpdate(now)) {
-      heard = true;
-      const AltRaw& raw = sensors_.getAltMeas();
-      startCalibration_.addPressure(raw.pressure);
-      navigation_.updateAltMeas(sensors_.processAltMeas(raw), now);
-      logger_.logAlt(toRecord(time, clock_.at(raw.sampled), raw));
-      logAid<AidSource::Altimeter>(time, estimator().altInnovation());
-    }
-    if (sensors_.gpsUpdate(now)) {
-      heard = true;
-      const GpsRaw& raw = sensors_.getGPSMeas();
-      if (sensors_.gpsUsable(raw)) {
-        if (!everArmed_) averageOrigin(raw);
-        const GpsSample gps = sensors_.processGPSMeas(raw);
-        navigation_.updateGPSMeas(gps.positionNed, gps.velocityNed, now);
-        fixed = true;
+    now_ = board_.micros();  // the one time stamp of this pass
+    time_ = clock_.update(now_);
+    watchPass();
+    if (estimation_.read(now_, time_, motors_.throttle())) {
+      estimation_.finishPass(now_);
+      if (calibrating() && estimation_.calibrated()) {
+        estimation_.align(now_, time_, config_.parameters.declination * kDegToRad);
       }
-      logger_.logGPS(toRecord(time, clock_.at(raw.sampled), raw));
-      logAid<AidSource::Gps>(time, estimator().gpsInnovation());
     }
-    if (heard) {
-      const VehicleState before = fixed ? navigation_.state() : VehicleState{};
-      navigation_.finishPass(now);
-      if (fixed) smoother_.correct(before, navigation_.state());
-      if (calibrating() && startCalibration_.done()) finishCalibration(now, time);
+    ticked_ = controller_.due(now_);
+    if (ticked_) {
+      controlTick(now_, time_);
+    } else if (!motors_.armed()) {
+      store_.step();
     }
-    if (controller_.due(now)) controlTick(now, time);
-    logger_.write(time);
-    logger_.flush(time);
-    lastPass_ = now;
+    logger_.write(time_);
+    logger_.flush(time_);
+    lastPass_ = now_;
   }
 
+  /// For telemetry and console, between two passes. What it changes is logged: a replay does it
+  /// again.
+  /// @return nullptr: accepted, else why not
+  CommandRefusal command(const VehicleCommand& asked) {
+    const CommandRefusal refusal = obey(asked);
+    logger_.log(toRecord(time_, asked, refusal == nullptr));
+    return refusal;
+  }
+
+  /// Turns one motor on the bench; the console asks with a countdown. A duration of 0 ends it.
+  /// @param motor  from 0    @param throttle  0 to 1 of the ESC's range
+  CommandRefusal testMotor(int motor, float throttle, Micros duration) {
+    VehicleCommand asked{CommandKind::MotorTest, CommandSource::Console};
+    asked.index = static_cast<std::uint16_t>(motor);
+    asked.values[0] = throttle;
+    asked.time = duration;
+    return command(asked);
+  }
+
+  /// Keeps the parameters for the next start.
+  CommandRefusal saveParameters() {
+    if (motors_.armed()) return "parameters are saved with the motors off only: disarm first";
+    wrongConfig_ &= ~prearm::kParameters;
+    return store_.save(config_.parameters, key_);
+  }
+
+  /// This pass made a control tick: nothing that can wait shall come on top of it.
+  [[nodiscard]] bool ticked() const { return ticked_; }
+  [[nodiscard]] LogTime time() const { return time_; }  ///< of this pass
   [[nodiscard]] const FiniteStateMachine& stateMachine() const { return fsm_; }
-  [[nodiscard]] const Navigation<States>& navigation() const { return navigation_; }
-  [[nodiscard]] const ESKF<States>& estimator() const { return navigation_.filter(); }
-  [[nodiscard]] const Sensors<Board>& sensors() const { return sensors_; }
+  [[nodiscard]] ConditionSet conditions() const { return conditions_; }
+  [[nodiscard]] PreArmSet preArm() const { return preArm_; }
+  [[nodiscard]] const Navigation<States>& navigation() const { return estimation_.navigation(); }
+  [[nodiscard]] const ESKF<States>& estimator() const { return estimation_.filter(); }
+  [[nodiscard]] const Sensors<Board>& sensors() const { return estimation_.sensors(); }
   [[nodiscard]] const Motors& motors() const { return motors_; }
   [[nodiscard]] const Controller& controller() const { return controller_; }
   [[nodiscard]] const Guidance& guidance() const { return guidance_; }
+  [[nodiscard]] const Mission& mission() const { return config_.mission; }
+  [[nodiscard]] const Parameters& parameters() const { return config_.parameters; }
+  [[nodiscard]] const ParameterStore<Board>& store() const { return store_; }
+  /// That signs telemetry; all zero: none.
+  [[nodiscard]] const SigningKey& signingKey() const { return key_; }
+  void setSigningKey(const SigningKey& key) { key_ = key; }
+  [[nodiscard]] const Pilot& pilot() const { return pilot_; }
+  [[nodiscard]] const BatteryMonitor& battery() const { return battery_; }
+  [[nodiscard]] const TextHistory& texts() const { return recorder_.texts(); }
   [[nodiscard]] Logger<typename Board::Card>& logger() { return logger_; }
+  [[nodiscard]] const Logger<typename Board::Card>& logger() const { return logger_; }
+  [[nodiscard]] FlightStatus status() const { return statusOf(*this, now_); }
 
   /// What the last control tick logged of itself.
   [[nodiscard]] const topic::ControlTick& lastTick() const { return lastTick_; }
 
+  /// us, of the last second.
+  [[nodiscard]] Micros longestPass() const { return longestPass_; }
+
   /// Periods of any task missed since the start.
   [[nodiscard]] std::uint32_t overruns() const {
-    return sensors_.missed() + controller_.overruns();
+    return sensors().missed() + controller_.overruns();
   }
 
  private:
+  void watchPass() {
+    const Micros pass = elapsed(now_, lastPass_);
+    if (pass > longestSoFar_) longestSoFar_ = pass;
+    if (!passWatch_.run(now_)) return;
+    longestPass_ = longestSoFar_;
+    longestSoFar_ = 0;
+  }
+
   /// Every 2 ms: what the pilot wants, where to be, what it takes, and the motors.
   void controlTick(Micros now, LogTime time) {
-    VehicleState estimate = navigation_.state();
-    estimate.rateBody = controlRate_;
-    smoother_.advance();
-    if (!motors_.armed()) smoother_.clear();  // what stands still has nothing to jump after
-    smoother_.apply(estimate);
+    board_.feedWatchdog();
+    VehicleState estimate = estimation_.estimate(motors_.armed());
+    flyBlind(estimate);
     readPower(time);
+    readRadio(now, time);
     updateStateMachine(now, time, estimate);
-    const Reference& reference = guidance_.update(now);
+    guidance_.setPilot(pilot_.input(), !has(condition::kGpsLost), !has(condition::kAltLost),
+                       has(condition::kOnGround));
+    const Reference& reference = guidance_.update(now, estimate);
     const bool controlled = fsm_.getControlFlag() && !guidance_.idles();
     controller_.setGrounded(!controlled);
     controller_.updateControl(now, reference, estimate);
-    motors_.commandControl(controlled ? controller_.getControl() : Wrench::none());
+    if (fsm_.state() == FlightState::MotorTest) {
+      motors_.commandOne(testedMotor_, testShare_);
+    } else {
+      motors_.commandControl(controlled ? controller_.getControl() : Wrench::none());
+    }
     motors_.writeESC(board_);
     controller_.setAchieved(motors_.achieved());
-    navigation_.setMotors(motorState(now));
-    if (gyroFilter_.active()) gyroFilter_.setMotorSpeed(motors_.meanRevolutions());
+    estimation_.setMotors(motorState(now), motors_);
     lastTick_ = tick(now, time);
     logger_.logGNC(toRecords(time, estimate, reference, controller_, motors_, lastTick_));
-    logNavigation(now, time);
-    if (controlLog_.run(now)) logger_.log(toRecord(time, controller_, motors_));
-    if (faultLog_.run(now)) logFaults(now, time);
+    recorder_.logNavigation(now, time, navigation());
+    recorder_.logControl(now, time, controller_, motors_);
+    recorder_.logPilot(now, time, pilot_, guidance_.effectiveMode());
+    recorder_.logFaults(now, time, [this](SensorFaultCounts& counts) {
+      board_.countFaults(counts);
+      counts[SensorFault::ImuClipped] = sensors().clipped();
+      counts[SensorFault::Invalid] = sensors().invalid();
+    });
+    recorder_.watchSaving(now, time);
+  }
+
+  /// What the model of the aircraft says, while no IMU does.
+  void flyBlind(VehicleState& estimate) {
+    const std::array<float, kControlCount>& wrench = controller_.wrenchEstimate().now();
+    if (fsm_.state() == FlightState::Blind) {
+      estimate = estimation_.blind().update(wrench, kControlPeriod);
+    } else if (motors_.armed()) {
+      estimation_.blind().observe(wrench, estimate, kControlPeriod);
+    }
   }
 
   void readPower(LogTime time) {
@@ -186,47 +238,64 @@ class FlightSoftware {
     motors_.setBatteryVoltage(battery_.voltage());
   }
 
+  void readRadio(Micros now, LogTime time) {
+    RadioChannels channels;
+    if (!board_.readRadio(channels)) return;
+    pilot_.add(channels, now);
+    logger_.log(toRecord(time, channels));
+  }
+
+  void applyParameters() {
+    const Parameters& p = config_.parameters;
+    fence_ = {p.fenceRadius, p.fenceHeight};
+    cosArmTilt_ = cosine(p.armTilt * kDegToRad);
+    pilot_.configure(p);
+    hazards_.configure(p);
+    guidance_.configure(p);
+    missionGood_ = isFlyable(config_.mission, fence_);
+  }
+
+  static LogParameter parameterForLog(const void* owner, std::size_t index) {
+    const auto& self = *static_cast<const FlightSoftware*>(owner);
+    const ParameterInfo& row = kParameterTable[index];
+    return {row.name, self.config_.parameters.*row.member};
+  }
+
   /// The card's mission instead of the one compiled in; one that is wrong forbids arming.
-  void loadMission(LogTime time) {
+  void loadMission() {
     const std::string_view text = board_.missionText();
     if (text.empty()) return;
-    const ParsedMission parsed = parseMission("mission.txt", text, config_.fence);
-    if (!parsed.valid()) {
-      wrongConfig_ |= prearm::kMission;
-      logger_.logText(ulog::LogLevel::Error, time, MissionErrorText(parsed.error).text());
-      return;
+    const ParsedMission parsed = parseMission("mission.txt", text, fence_);
+    missionGood_ = parsed.valid();
+    if (missionGood_) {
+      takeMission(parsed.mission);
+    } else {
+      recorder_.say(ulog::LogLevel::Error, time_, MissionErrorText(parsed.error).text());
     }
-    wrongConfig_ &= ~prearm::kMission;
-    config_.mission = parsed.mission;
-    guidance_ = Guidance(parsed.mission, config_.guidance, config_.vehicle.mass * kGravity);
   }
 
+  void takeMission(const Mission& mission) {
+    config_.mission = mission;
+    missionGood_ = isFlyable(mission, fence_);
+    guidance_ = Guidance(mission, config_.guidance, weight());
+    guidance_.configure(config_.parameters);
+  }
+
+  void logMission() {
+    logger_.log(toRecord(time_, config_, found_));
+    const Mission& mission = config_.mission;
+    for (std::size_t i = 0; i < mission.legCount && i < Mission::kMaxLegs; ++i) {
+      logger_.log(toRecord(time_, mission.legs[i]));
+    }
+  }
+
+  [[nodiscard]] float weight() const { return config_.vehicle.mass * kGravity; }
   [[nodiscard]] bool calibrating() const { return fsm_.state() == FlightState::Boot; }
-
-  /// Aligns the filter with what the still aircraft showed.
-  void finishCalibration(Micros now, LogTime time) {
-    const StartCalibration& found = startCalibration_;
-    const Alignment alignment = alignStill(found.accel(), found.mag(), config_.declination);
-    const float gravity = found.accel().norm();
-    sensors_.setStartCalibration(found.gyroBias(), found.groundPressure());
-    navigation_.initialize(alignment, gravity, now);
-    const GeoPoint& origin = sensors_.origin();
-    logger_.log(topic::EstimatorStart{
-        time, toArray(found.gyroBias()), gravity, toArray(alignment.magReference),
-        found.groundPressure(), origin.latitude, origin.longitude, toArray(alignment.attitude)});
-  }
-
-  /// Before the first flight every fix makes the origin better. Then it stands still, also when the
-  /// aircraft has landed somewhere else.
-  void averageOrigin(const GpsRaw& raw) {
-    origin_.add(Sensors<Board>::geoPoint(raw));
-    sensors_.setOrigin(origin_.origin());
-  }
+  [[nodiscard]] bool has(ConditionSet bit) const { return (conditions_ & bit) != 0; }
 
   /// What the motors do to magnetometer and accelerometer.
   [[nodiscard]] MotorState motorState(Micros now) {
-    const float weight = config_.vehicle.mass * kGravity;
-    const float excess = motors_.achieved().thrust / weight - 1.0F;
+    const float excess = motors_.achieved().thrust / weight() - 1.0F;
     hover_.update(now, motors_.armed() && excess < config_.hover.thrustBand &&
                            excess > -config_.hover.thrustBand);
     if (!motors_.armed()) return MotorState::Stopped;
@@ -234,87 +303,66 @@ class FlightSoftware {
   }
 
   void updateStateMachine(Micros now, LogTime time, const VehicleState& estimate) {
-    const PilotSwitches pilot = board_.readPilot();
-    const ConditionSet failures = preArmFailures(now, pilot, estimate);
-    const ConditionSet conditions = conditionsNow(now, pilot, estimate, failures);
-    const Transition* row = fsm_.update(conditions);
-    if (row != nullptr) {
-      entered_ = now;
-      touchDown_.reset(now);
-      guidance_.enter(fsm_.state(), now, estimate);
-      if (fsm_.getMotorFlag() && !motors_.armed()) motors_.arm();
-      everArmed_ = everArmed_ || motors_.armed();
-      if (!fsm_.getMotorFlag() && motors_.armed()) motors_.disarm();  // written by this tick
-      say(time, *row, failures);
+    const ConditionSet wishes = pilot_.update(now, board_.readPilot(), motors_.armed());
+    const float cosine = cosTilt(estimate.attitude);
+    preArm_ = preArmFailures(now, estimate, cosine);
+    conditions_ = wishes | guidance_.conditions(now, estimate) |
+                  hazards_.update(signs(now, estimate, cosine, estimation_.takeFixed()), now) |
+                  ownConditions(now, estimate);
+    linkHeard_ = false;
+    const Transition* row = fsm_.update(conditions_);
+    if (row != nullptr) take(*row, now, time, estimate);
+    if (row == nullptr && !stateLog_.due(now)) return;
+    stateLog_.postpone(now);
+    logger_.log(topic::FlightState{time, conditions_, preArm_,
+                                   static_cast<std::uint8_t>(fsm_.state()), fsm_.getControlFlag(),
+                                   fsm_.getMotorFlag(), fsm_.getCriticalErrorFlag()});
+  }
+
+  /// What a transition does beside changing the state.
+  void take(const Transition& row, Micros now, LogTime time, const VehicleState& estimate) {
+    entered_ = now;
+    touchDown_.reset(now);
+    pilot_.done(row.failsafe ? ~condition::kNone : row.when);
+    if (fsm_.state() == FlightState::Armed) estimation_.blind().reset();
+    if (fsm_.state() == FlightState::Blind) {
+      estimation_.blind().start(estimate);
+      imuBack_.reset(now);
     }
-    if (row != nullptr || stateLog_.due(now)) {
-      stateLog_.postpone(now);
-      logger_.log(topic::FlightState{time, conditions, failures,
-                                     static_cast<std::uint8_t>(fsm_.state()), fsm_.getControlFlag(),
-                                     fsm_.getMotorFlag(), fsm_.getCriticalErrorFlag()});
+    guidance_.enter(fsm_.state(), now, estimate, (row.when & condition::kHoldAsked) != 0);
+    if ((row.when & condition::kCalibrateAsked) != 0) estimation_.recalibrate();
+    if (fsm_.getMotorFlag() != motors_.armed()) {  // written to the ESCs by this tick
+      if (fsm_.getMotorFlag()) {
+        motors_.arm();
+      } else {
+        motors_.disarm();
+      }
+      board_.rememberMotors(motors_.armed());
     }
-    logSwitches(now, time, pilot);
-  }
-
-  /// Everything that forbids arming now.
-  [[nodiscard]] ConditionSet preArmFailures(Micros now, const PilotSwitches& pilot,
-                                            const VehicleState& estimate) const {
-    ConditionSet set = wrongConfig_;
-    const auto refuseIf = [&set](bool bad, ConditionSet bit) { set |= bad ? bit : 0U; };
-    refuseIf(calibrating(), prearm::kNotCalibrated);
-    refuseIf(!found_.imu || !sensors_.imuFresh(now), prearm::kImu);
-    refuseIf(!found_.mag || !sensors_.magFresh(now), prearm::kMag);
-    refuseIf(!found_.alt || !sensors_.altFresh(now), prearm::kAlt);
-    if (!config_.mission.onStand()) {  // which has no place, and may be under a roof
-      refuseIf(!sensors_.gpsFresh(now) || !sensors_.gpsUsable(sensors_.getGPSMeas()), prearm::kGps);
-      refuseIf(origin_.count() < config_.originFixes, prearm::kOrigin);
-      refuseIf(!config_.fence.contains(estimate.positionNed), prearm::kFence);
-    }
-    refuseIf((navigation_.health() & health::kNoArming) != 0, prearm::kEstimator);
-    refuseIf(!(cosTilt(estimate.attitude) > cosArmTilt_), prearm::kTilt);
-    refuseIf(!navigation_.standsStill(), prearm::kMoving);
-    refuseIf(pilot.kill, prearm::kKillSwitch);
-    refuseIf(pilot.start, prearm::kStartSwitch);
-    refuseIf(!found_.card || logger_.failed(), prearm::kLog);
-    return set;
-  }
-
-  [[nodiscard]] ConditionSet conditionsNow(Micros now, const PilotSwitches& pilot,
-                                           const VehicleState& estimate, ConditionSet failures) {
-    ConditionSet set = guidance_.conditions(now, estimate);
-    const auto setIf = [&set](bool present, ConditionSet bit) { set |= present ? bit : 0U; };
-    setIf(startCalibration_.done(), condition::kCalibrated);
-    setIf(pilot.arm && !armSwitchWasOn_, condition::kArmEdge);
-    armSwitchWasOn_ = pilot.arm;
-    setIf(!pilot.arm, condition::kDisarm);
-    setIf(failures != 0, condition::kPreArmFailure);
-    setIf(pilot.start, condition::kStart);
-    setIf(elapsed(now, entered_) >= config_.armedTimeout, condition::kArmedTooLong);
-    setIf(touchDown(now, estimate), condition::kTouchDown);
-    setIf(pilot.kill, condition::kKill);
-    setIf(!(cosTilt(estimate.attitude) > 0.0F), condition::kUpset);
-    setIf(!config_.fence.contains(navigation_.state().positionNed), condition::kOutsideFence);
-    setIf(!sensors_.imuFresh(now), condition::kImuLost);
-    setIf(!navigation_.healthy(), condition::kEstimatorUnhealthy);
-    return set;
-  }
-
-  [[nodiscard]] bool touchDown(Micros now, const VehicleState& estimate) {
-    const float weight = config_.vehicle.mass * kGravity;
-    return touchDown_.update(
-        now, fsm_.state() == FlightState::Land &&
-                 motors_.achieved().thrust < config_.touchDown.thrustFraction * weight &&
-                 estimate.velocityNed.z() < config_.touchDown.sinkRate);
-  }
-
-  /// Tells the pilot and the log what happened, and why arming was refused.
-  void say(LogTime time, const Transition& row, ConditionSet failures) {
+    if (motors_.armed()) estimation_.keepOrigin();
     const bool cutOff = row.to == FlightState::Safe && (row.from & in(FlightState::Safe)) == 0;
-    logger_.logText(cutOff ? ulog::LogLevel::Error : ulog::LogLevel::Info, time, row.said);
-    if (row.to != FlightState::Armed && (row.when & condition::kArmEdge) != 0) {
-      logger_.logText(ulog::LogLevel::Warning, time, firstRefusal(failures));
+    if (cutOff) recorder_.save(now);
+    recorder_.say(cutOff || row.failsafe ? ulog::LogLevel::Error : ulog::LogLevel::Info, time,
+                  row.said);
+    if (row.to != FlightState::Armed && (row.when & condition::kArmEdge) != 0 && preArm_ != 0) {
+      recorder_.say(ulog::LogLevel::Warning, time, firstRefusal(preArm_));
     }
   }
+
+  // FlightConditions.h: what is true now.
+  [[nodiscard]] PreArmSet preArmFailures(Micros now, const VehicleState& estimate,
+                                         float cosine) const;
+  [[nodiscard]] HazardSigns signs(Micros now, const VehicleState& estimate, float cosine,
+                                  bool fixed) const;
+  [[nodiscard]] ConditionSet ownConditions(Micros now, const VehicleState& estimate);
+  [[nodiscard]] bool standsOnGround(Micros now, const VehicleState& estimate);
+
+  // FlightCommands.h: what commands do.
+  [[nodiscard]] CommandRefusal obey(const VehicleCommand& c);
+  [[nodiscard]] CommandRefusal wish(ConditionSet bit);
+  [[nodiscard]] CommandRefusal takeMotorTest(const VehicleCommand& c);
+  [[nodiscard]] CommandRefusal takeSetpoint(const VehicleCommand& c);
+  [[nodiscard]] CommandRefusal upload(const VehicleCommand& c);
 
   [[nodiscard]] topic::ControlTick tick(Micros now, LogTime time) const {
     StateHash hash;
@@ -326,8 +374,8 @@ class FlightSoftware {
     hash.add(estimator().gyroBias());
     hash.add(estimator().magBias());
     hash.add(estimator().packedCovariance().elements());
-    hash.add(smoother_.position());
-    hash.add(smoother_.velocity());
+    hash.add(estimation_.smoother().position());
+    hash.add(estimation_.smoother().velocity());
     hash.add(controller_.error());
     hash.add(controller_.integral().horizontalNed());
     hash.add(controller_.integral().down());
@@ -338,91 +386,56 @@ class FlightSoftware {
     return {time, hash.value(), elapsed(now, lastPass_), overruns()};
   }
 
-  template <AidSource Source>
-  void logAid(LogTime time, const Innovation& innovation) {
-    logger_.template logAid<Source>(toRecord(time, innovation));
-  }
-
-  /// How sure the filter is, and in words what has just gone wrong with it.
-  void logNavigation(Micros now, LogTime time) {
-    if (stdLog_.run(now)) logger_.log(toStdRecord(time, estimator()));
-    if (!statusLog_.run(now)) return;
-    logger_.log(toBiasRecord(time, estimator()));
-    logger_.log(toRecord(time, navigation_));
-    const NavigationHealth begun = navigation_.health() & ~loggedHealth_;
-    loggedHealth_ = navigation_.health();
-    for (const HealthText& text : kHealthTexts) {
-      if ((begun & text.bit) != 0) logger_.logText(ulog::LogLevel::Warning, time, text.said);
-    }
-    if (navigation_.readmissions() == loggedReadmissions_) return;
-    loggedReadmissions_ = navigation_.readmissions();
-    logger_.logText(ulog::LogLevel::Warning, time,
-                    "estimator: takes in again a sensor it had rejected for long");
-  }
-
-  /// Nothing is decided by these counts: a reading that does not come is seen as that.
-  void logFaults(Micros now, LogTime time) {
-    SensorFaultCounts counts;
-    board_.countFaults(counts);
-    counts[SensorFault::ImuClipped] = sensors_.clipped();
-    counts[SensorFault::Invalid] = sensors_.invalid();
-    const std::uint32_t before = faults_.flags();
-    const std::uint32_t begun = faults_.update(now, counts);
-    for (std::size_t i = 0; i < kSensorFaultCount; ++i) {
-      if ((begun >> i & 1U) == 0) continue;
-      logger_.logText(ulog::LogLevel::Warning, time, kSensorFaultTexts[i]);
-    }
-    if (faults_.flags() == before && !faultRecord_.due(now)) return;
-    faultRecord_.postpone(now);
-    logger_.log(topic::SensorFaults{time, faults_.flags(), counts.all()});
-  }
-
-  void logSwitches(Micros now, LogTime time, const PilotSwitches& pilot) {
-    const bool changed = pilot.arm != loggedPilot_.arm || pilot.kill != loggedPilot_.kill ||
-                         pilot.start != loggedPilot_.start;
-    if (!changed && !switchLog_.due(now)) return;
-    switchLog_.postpone(now);
-    loggedPilot_ = pilot;
-    logger_.log(toRecord(time, pilot));
-  }
+  static constexpr float kMostTest = 0.3F;  ///< ours: less than hovering takes
+  static constexpr Micros kLongestTest = 10'000'000;
+  static constexpr Micros kSetpointFresh = 500'000;  ///< as PX4's COM_OF_LOSS_T began
 
   Board& board_;
   FlightSoftwareConfig config_;
-  Sensors<Board> sensors_;
-  StartCalibration startCalibration_;
-  OriginAverage origin_;
-  Navigation<States> navigation_;
-  CorrectionSmoother smoother_;
+  ParameterStore<Board> store_;
+  SigningKey key_{};
+  LogClock clock_;
+  Logger<typename Board::Card> logger_;
+  FlightRecorder<Logger<typename Board::Card>> recorder_;
+  Estimation<Board, States, Logger<typename Board::Card>> estimation_;
   BatteryMonitor battery_;
+  Pilot pilot_;
+  Hazards hazards_;
   FiniteStateMachine fsm_;
   Guidance guidance_;
+  MissionUpload upload_;
   Controller controller_;
   Motors motors_;
-  GyroFilter gyroFilter_;
-  Vector3f controlRate_ = Vector3f::Zero();  ///< rad/s, body, filtered for the controller
-  Logger<typename Board::Card> logger_;
-  LogClock clock_;
   SensorSet found_;
+  ResetStatus reset_;
+  Fence fence_;
   Persistence touchDown_;
   Persistence hover_;
-  ConditionSet wrongConfig_;  ///< what no flight can mend
-  const float cosArmTilt_;
+  Persistence imuBack_{200'000};  ///< ours: 200 samples in a row
+  PreArmSet wrongConfig_;         ///< what no flight can mend
+  float cosArmTilt_ = 0.0F;
   PeriodicTask stateLog_{periodFromHz(10)};
-  PeriodicTask switchLog_{periodFromHz(1)};
-  PeriodicTask stdLog_{periodFromHz(50)};
-  PeriodicTask statusLog_{periodFromHz(10)};
-  PeriodicTask controlLog_{periodFromHz(50)};
-  PeriodicTask faultLog_{periodFromHz(10)};
-  PeriodicTask faultRecord_{periodFromHz(1)};
-  SensorFaultWatch faults_;
-  NavigationHealth loggedHealth_ = health::kNone;
-  std::uint32_t loggedReadmissions_ = 0;
-  PilotSwitches loggedPilot_;
   topic::ControlTick lastTick_;
+  ConditionSet conditions_ = condition::kNone;  ///< of the last tick
+  PreArmSet preArm_ = prearm::kNotCalibrated;
+  LogTime time_ = 0;    ///< of this pass
+  Micros now_ = 0;      ///< of this pass
   Micros entered_ = 0;  ///< when the present state began
   Micros lastPass_ = 0;
-  bool everArmed_ = false;
-  bool armSwitchWasOn_ = true;  ///< so that a switch held through power-up is no edge
+  Micros longestPass_ = 0;   ///< of the last whole second
+  Micros longestSoFar_ = 0;  ///< of this one
+  PeriodicTask passWatch_{periodFromHz(1)};
+  Micros testEnds_ = 0;  ///< of the motor test
+  float testShare_ = 0.0F;
+  std::uint8_t testedMotor_ = 0;
+  Micros guidedAt_ = 0;  ///< when the last setpoint came
+  bool guidedKnown_ = false;
+  bool ticked_ = false;
+  bool linkHeard_ = false;  ///< since the last tick
+  bool missionGood_ = true;
 };
 
 }  // namespace strix
+
+#include "FlightCommands.h"
+#include "FlightConditions.h"

@@ -7,6 +7,7 @@
 #include "GyroFilter.h"
 #include "Motors.h"
 #include "NavigationConfig.h"
+#include "Parameters.h"
 #include "Sensors.h"
 #include "StartCalibration.h"
 #include "Vehicle.h"
@@ -17,6 +18,7 @@ struct FlightSoftwareConfig {
   const Vehicle& vehicle;
   const Gains& gains;
   Mission mission;
+  Parameters parameters{};  ///< where the board has none stored
   SensorConfig sensors{};
   StartCalibrationConfig startCalibration{};
   NavigationConfig navigation{};
@@ -25,14 +27,11 @@ struct FlightSoftwareConfig {
   GuidanceConfig guidance{};
   MotorConfig motors{};
   ControlConfig control{};
-  Fence fence{};
   TouchDownConfig touchDown{};
   HoverConfig hover{};
-  std::uint8_t design = 0;            ///< which of the airframe's designs `gains` is, for the log
-  float declination = 0.0F;           ///< rad, east positive: magnetic to true north
-  std::uint32_t originFixes = 50;     ///< GPS fixes averaged before arming is allowed
-  float armTilt = 20.0F * kDegToRad;  ///< rad, most tilt at arming
-  Micros armedTimeout = 30'000'000;   ///< armed without take-off
+  std::uint8_t design = 0;           ///< which of the airframe's designs `gains` is, for the log
+  std::uint32_t originFixes = 50;    ///< GPS fixes averaged before arming is allowed
+  Micros armedTimeout = 30'000'000;  ///< armed without take-off
 };
 
 }  // namespace strix

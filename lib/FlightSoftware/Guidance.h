@@ -3,10 +3,14 @@
 
 #include "Conditions.h"
 #include "Mission.h"
+#include "Parameters.h"
+#include "PilotInput.h"
 #include "ReferenceRamp.h"
 #include "StandSequence.h"
 #include "States.h"
+#include "StickFlight.h"
 #include "Trajectory.h"
+#include "VehicleCommand.h"
 
 namespace strix {
 
@@ -24,6 +28,14 @@ struct GuidanceConfig {
   float standThrust = 0.6F;  ///< of the weight, ours: near hover, and the stand holds it
 };
 
+/// ours: sink rate without an IMU, m/s. Higher up there is less time left of BLIND_TIME; an
+/// aircraft that comes down with 2.5 m/s may break a propeller.
+[[nodiscard]] inline float blindSink(float height) {
+  const float sink = 0.6F * height;
+  if (sink < 1.0F) return 1.0F;
+  return sink > 2.5F ? 2.5F : sink;
+}
+
 class Guidance {
  public:
   /// @param weight  N, of which the stand's thrust is a share
@@ -32,10 +44,63 @@ class Guidance {
         config_(config),
         standThrust_(config.standThrust * weight),
         ramp_(config.ramp),
-        trajectory_(config.trajectory) {}
+        trajectory_(config.trajectory),
+        sticks_(weight) {}
+
+  void configure(const Parameters& p) {
+    config_.returnHeight = p.returnHeight;
+    config_.trajectory.speedHorizontal = p.speedHorizontal;
+    config_.trajectory.speedVertical = p.speedVertical;
+    trajectory_.setLimits(config_.trajectory);
+    sticks_.configure(p);
+  }
+
+  /// What the pilot's sticks say now.
+  /// @param position, height  whether the estimate has one to hold
+  /// @param onGround  with the throttle down: the motors idle
+  void setPilot(const PilotInput& input, bool position, bool height, bool onGround) {
+    input_ = input;
+    mode_ = input.mode;
+    if (mode_ == PilotMode::PositionHold && !position) mode_ = PilotMode::AltitudeHold;
+    if (mode_ == PilotMode::AltitudeHold && !height) mode_ = PilotMode::Attitude;
+    if (state_ == FlightState::Manual) idles_ = onGround;
+    if (waits_ && input.valid && input.start && !usesSticks(input.mode)) waits_ = false;
+  }
+
+  /// Of the pilot's mode what can be flown now.
+  [[nodiscard]] PilotMode effectiveMode() const { return mode_; }
+
+  /// CommandKind::Setpoint: a place within the fence, or a velocity.
+  void setSetpoint(const VehicleCommand& c, const Fence& fence) {
+    const auto given = [&c](unsigned first, unsigned count) {
+      const unsigned bits = ((1U << count) - 1U) << first;
+      return (c.index & bits) == bits;
+    };
+    setpoint_ = c;
+    toPlace_ = given(0, 3);
+    if (!toPlace_) return;
+    const float level = squareRoot(c.values[0] * c.values[0] + c.values[1] * c.values[1]);
+    const float most = fence.radius - kInsideFence;
+    const float share = level > most ? most / level : 1.0F;
+    const float highest = fence.height - kInsideFence;
+    float height = c.values[2] < highest ? c.values[2] : highest;
+    if (height < kInsideFence) height = kInsideFence;
+    place_ = {share * c.values[0], share * c.values[1], -height};
+    if (state_ == FlightState::Guided && source_ == Source::Trajectory) goToSetpoint();
+  }
+
+  /// Ends a hold that somebody asked for.
+  void resume() { waits_ = false; }
+
+  /// The leg that is flown, from 1; 0: none yet.
+  [[nodiscard]] std::uint8_t leg() const { return leg_; }
 
   /// Called when the state machine has just entered `state`.
-  void enter(FlightState state, Micros now, const VehicleState& estimate) {
+  /// @param asked  somebody asked for it: a hold then lasts until he resumes
+  void enter(FlightState state, Micros now, const VehicleState& estimate, bool asked = false) {
+    const FlightState before = state_;
+    waits_ = state == FlightState::Hold &&
+             (asked || before == FlightState::Manual || before == FlightState::Guided);
     state_ = state;
     entered_ = now;
     idles_ = false;
@@ -56,6 +121,7 @@ class Guidance {
         if (leg_ < mission_.legCount) startLeg(mission_.legs[leg_++], now, estimate);
         break;
       case FlightState::Hold:
+        if (waits_) stop(now, estimate);
         // From one attitude straight to the next; after the last one the aircraft is stopped.
         if (source_ == Source::Attitude && !nextIsAttitude()) stop(now, estimate);
         break;
@@ -65,6 +131,32 @@ class Guidance {
       case FlightState::Land:
         stop(now, estimate);
         if (trajectory_.arrived()) startDescent(now);
+        break;
+      case FlightState::Manual:
+        if (before == FlightState::Armed) {  // no mission has begun
+          leg_ = 0;
+          startYaw_ = yawOf(estimate.attitude);
+        }
+        source_ = Source::Sticks;
+        sticks_.start(now, estimate);
+        break;
+      case FlightState::Guided:
+        if (toPlace_) {
+          takeOver(now, estimate);
+          trajectory_.setSpeed(0.0F);
+          goToSetpoint();
+        } else {
+          source_ = Source::Sticks;
+          sticks_.start(now, estimate);
+        }
+        break;
+      case FlightState::Blind:
+        source_ = Source::Ramp;
+        ramp_.setVerticalSpeed(blindSink(-estimate.positionNed.z()));
+        ramp_.reset(now, estimate);
+        target_ = estimate.positionNed;
+        target_.z() = config_.landingDepth;
+        ramp_.setTarget(target_, yawOf(estimate.attitude));
         break;
       case FlightState::AttitudeStand:
         source_ = Source::Stand;
@@ -77,8 +169,11 @@ class Guidance {
   }
 
   /// The reference at `now`.
-  const Reference& update(Micros now) {
+  const Reference& update(Micros now, const VehicleState& estimate) {
     switch (source_) {
+      case Source::Sticks:
+        updateSticks(now, estimate);
+        break;
       case Source::Ramp:
         if (state_ == FlightState::Land &&
             -ramp_.reference().positionNed.z() < config_.landingSlowHeight) {
@@ -104,7 +199,7 @@ class Guidance {
     ConditionSet set = condition::kNone;
     const Micros waited = elapsed(now, entered_);
     const bool legsRemain = leg_ < mission_.legCount;
-    const bool holdDone = waited >= holdTime_ && !(stopping_ && !trajectory_.arrived());
+    const bool holdDone = !waits_ && waited >= holdTime_ && !(stopping_ && !trajectory_.arrived());
     if (arrived(waited, estimate)) set |= condition::kArrived;
     if (holdDone) set |= condition::kHoldDone;
     if (legsRemain) set |= condition::kLegsRemain;
@@ -124,11 +219,14 @@ class Guidance {
 
   [[nodiscard]] const Reference& reference() const {
     if (source_ == Source::Ramp) return ramp_.reference();
+    if (source_ == Source::Sticks) return sticks_.reference();
     return source_ == Source::Trajectory ? trajectory_.reference() : tilted_;
   }
 
  private:
-  enum class Source : std::uint8_t { Ramp, Trajectory, Attitude, Stand };
+  enum class Source : std::uint8_t { Ramp, Trajectory, Attitude, Stand, Sticks };
+
+  static constexpr float kInsideFence = 1.0F;  ///< m, ours: of positions by telemetry
 
   void setTarget(const Vector3f& positionNed, float yaw) {
     target_ = positionNed;
@@ -141,6 +239,12 @@ class Guidance {
   void takeOver(Micros now, const VehicleState& estimate) {
     if (source_ != Source::Trajectory) {
       Reference from = reference();
+      if (source_ == Source::Sticks || source_ == Source::Stand) {
+        from = {};
+        from.positionNed = estimate.positionNed;
+        from.velocityNed = estimate.velocityNed;
+        from.yaw = yawOf(estimate.attitude);
+      }
       if (source_ == Source::Attitude) {
         from.positionNed.head<2>() = estimate.positionNed.head<2>();
         from.velocityNed.head<2>() = estimate.velocityNed.head<2>();
@@ -214,6 +318,22 @@ class Guidance {
     ramp_.setTarget(target_, targetYaw_);
   }
 
+  void goToSetpoint() {
+    const bool turns = (setpoint_.index >> 3U & 1U) != 0;
+    setTarget(place_, turns ? setpoint_.values[3] : targetYaw_);
+  }
+
+  void updateSticks(Micros now, const VehicleState& estimate) {
+    if (state_ == FlightState::Guided) {
+      if (toPlace_) return enter(state_, now, estimate);  // from velocities to places
+      const std::array<float, 8>& v = setpoint_.values;
+      sticks_.flyVelocity(now, {v[4], v[5], -v[6]}, v[7], estimate);
+      return;
+    }
+    if (idles_) sticks_.start(now, estimate);
+    sticks_.fly(now, input_, mode_, estimate);
+  }
+
   /// At the height that the last trajectory gives.
   void updateAttitude(Micros now) {
     const Reference& level = trajectory_.update(now);
@@ -255,6 +375,7 @@ class Guidance {
         }
         return trajectory_.arrived() && near(estimate);
       case Source::Stand:
+      case Source::Sticks:
         break;
     }
     return false;
@@ -275,7 +396,14 @@ class Guidance {
   float standThrust_;  ///< N
   ReferenceRamp ramp_;
   Trajectory trajectory_;
-  Reference tilted_;  ///< that of an attitude leg or of the stand
+  StickFlight sticks_;
+  PilotInput input_;
+  PilotMode mode_ = PilotMode::Mission;
+  VehicleCommand setpoint_;            ///< the last one
+  Vector3f place_ = Vector3f::Zero();  ///< m, NED, where it asks for one
+  bool toPlace_ = false;
+  bool waits_ = false;  ///< in HOLD until somebody resumes
+  Reference tilted_;    ///< that of an attitude leg or of the stand
   Source source_ = Source::Ramp;
   FlightState state_ = FlightState::Boot;
   Vector3f target_ = Vector3f::Zero();

@@ -5,9 +5,9 @@
 /// the log, and nothing of either's states. What comes in between two ticks is held or averaged:
 ///
 ///   IMU       read in each pass; the mean since the last tick. Its turn over the tick is exact,
-///   and
-///             the mean over 20 ms is blind to the propellers, which a single sample at 50 Hz would
-///             fold down to any frequency. It costs 10 ms of age: observer_gains.py counts with it.
+///             and the mean over 20 ms is blind to the propellers, which a single sample at 50 Hz
+///             would fold down to any frequency. It costs 10 ms of age: observer_gains.py counts
+///             with it.
 ///   field     the last, once
 ///   pressure  10 Hz, the last; for the log: nothing here flies by height
 ///   ESCs      5 Hz, the last voltage
@@ -20,6 +20,7 @@
 #include "FlightLog.h"
 #include "Logger.h"
 #include "Motors.h"
+#include "Pilot.h"
 #include "PowerReadings.h"
 #include "ReducedObserver.h"
 #include "Sensors.h"
@@ -38,6 +39,7 @@ struct UgglanFlightConfig {
   StartCalibrationConfig startCalibration{};
   ComplementaryConfig filter{};
   StickLimits sticks{};
+  Parameters parameters{};            ///< of the radio: its receiver, channels and time-out
   float declination = 0.0F;           ///< rad, east positive: magnetic to true north
   float armTilt = 20.0F * kDegToRad;  ///< rad, most tilt at arming
   float armRate = 0.1F;               ///< rad/s: turning faster is no standing still
@@ -69,7 +71,9 @@ class UgglanFlight {
 
   /// Starts the board and the log. Start-up calibration follows in the loop.
   void setup() {
+    pilot_.configure(config_.parameters);
     (void)board_.begin();  // a device that did not answer gives nothing, and so forbids arming
+    board_.beginRadio(static_cast<RadioProtocol>(config_.parameters.radioProtocol));
     const Micros now = board_.micros();
     const LogTime time = clock_.update(now);
     lastPass_ = lastTick_ = lastField_ = now;
@@ -157,18 +161,23 @@ class UgglanFlight {
   /// Arms on the switch's edge when nothing forbids it; any one reason stops the motors, and then
   /// only another edge starts them.
   void arming(Micros now, LogTime time) {
-    const PilotSwitches pilot = board_.readPilot();
-    sticks_ = board_.readSticks();
-    const bool edge = pilot.arm && !armSwitchWasOn_;
-    armSwitchWasOn_ = pilot.arm;
+    RadioChannels channels;
+    if (board_.readRadio(channels)) {
+      pilot_.add(channels, now);
+      logger_.log(toRecord(time, channels));
+    }
+    const ConditionSet wishes = pilot_.update(now, board_.readPilot(), motors_.armed());
+    const bool off = (wishes & condition::kDisarm) != 0;
+    const bool kill = (wishes & condition::kKill) != 0;
+    const bool edge = (wishes & condition::kArmEdge) != 0;
     if (motors_.armed()) {
-      if (const char* reason = reasonToStop(now, pilot)) {
+      if (const char* reason = reasonToStop(now, off, kill)) {
         motors_.disarm();
         motors_.writeESC(board_);
-        logger_.logText(pilot.arm ? ulog::LogLevel::Error : ulog::LogLevel::Info, time, reason);
+        logger_.logText(off ? ulog::LogLevel::Info : ulog::LogLevel::Error, time, reason);
       }
     } else if (edge) {
-      const char* refusal = reasonNotToArm(now, pilot);
+      const char* refusal = reasonNotToArm(now, kill);
       if (refusal == nullptr) {
         motors_.arm();
         grounded_ = true;
@@ -177,13 +186,14 @@ class UgglanFlight {
       logger_.logText(refusal == nullptr ? ulog::LogLevel::Info : ulog::LogLevel::Warning, time,
                       refusal == nullptr ? "armed" : refusal);
     }
-    const bool changed = pilot.arm != loggedPilot_.arm || pilot.kill != loggedPilot_.kill ||
-                         pilot.start != loggedPilot_.start || motors_.armed() != loggedArmed_;
+    const PilotSwitches& wired = pilot_.switches();
+    const bool changed = wired.arm != loggedPilot_.arm || wired.kill != loggedPilot_.kill ||
+                         wired.start != loggedPilot_.start || motors_.armed() != loggedArmed_;
     if (!changed && !stateLog_.due(now)) return;
     stateLog_.postpone(now);
-    loggedPilot_ = pilot;
+    loggedPilot_ = wired;
     loggedArmed_ = motors_.armed();
-    logger_.log(toRecord(time, pilot));
+    logger_.log(toRecord(time, wired));
     const FlightState state = motors_.armed() ? FlightState::Armed
                               : aligned_      ? FlightState::Idle
                                               : FlightState::Boot;
@@ -191,21 +201,22 @@ class UgglanFlight {
                                    motors_.armed(), false});
   }
 
-  [[nodiscard]] const char* reasonToStop(Micros now, const PilotSwitches& pilot) const {
-    if (pilot.kill) return "kill switch: motors off";
-    if (!pilot.arm) return "disarmed";
-    if (!sticks_.valid) return "sticks lost: motors off";
+  [[nodiscard]] const char* reasonToStop(Micros now, bool off, bool kill) const {
+    if (kill) return "kill switch: motors off";
+    if (off) return "disarmed";
+    if (pilot_.radioLost()) return "sticks lost: motors off";
     if (!sensors_.imuFresh(now)) return "IMU lost: motors off";
     if (!(cosTilt(filter_.attitude()) > 0.0F)) return "tilted past 90 deg: motors off";
     return nullptr;
   }
 
-  [[nodiscard]] const char* reasonNotToArm(Micros now, const PilotSwitches& pilot) const {
+  [[nodiscard]] const char* reasonNotToArm(Micros now, bool kill) const {
     if (!sensors_.imuFresh(now)) return "IMU gives no data: check its wiring";
     if (!aligned_) return "start-up calibration is not done: let the aircraft stand still";
-    if (pilot.kill) return "kill switch is on: release it";
-    if (!sticks_.valid) return "no sticks: switch the transmitter on";
-    if (!(sticks_.throttle <= config_.armThrottle)) return "throttle is not low: pull it down";
+    if (kill) return "kill switch is on: release it";
+    if (pilot_.radioLost()) return "no sticks: switch the transmitter on";
+    if (!(pilot_.input().throttle <= config_.armThrottle))
+      return "throttle is not low: pull it down";
     if (!(cosTilt(filter_.attitude()) > cosArmTilt_)) {
       return "aircraft is tilted more than 20 deg: set it level";
     }
@@ -220,7 +231,7 @@ class UgglanFlight {
     lastTick_ = now;
     updateAttitude(now, dt);
     const float heading = yawOf(filter_.attitude());
-    const PilotDemand demand = mapping_.demand(sticks_);
+    const PilotDemand demand = mapping_.demand(pilot_.input());
     updateGrounded(now, demand);
     if (grounded_) {
       law_.reset();
@@ -297,6 +308,7 @@ class UgglanFlight {
                                         {kNaN, kNaN, kNaN, kNaN},
                                         {kNaN, torque.x(), torque.y(), torque.z()},
                                         motors_.supply()});
+    logger_.log(toRecord(time, pilot_.input(), PilotMode::Attitude));
     logger_.log(topic::ActuatorOutputs{time, kMotorCount, motors_.commands()});
     logger_.log(topic::ControlTick{time, hash.value(), elapsed(now, lastPass_), overruns()});
   }
@@ -323,7 +335,7 @@ class UgglanFlight {
   Vector3f rate_ = Vector3f::Zero();   ///< rad/s, body, without the filter's bias
   Vector3f field_ = Vector3f::Zero();  ///< uT, body
   float height_ = 0.0F;                ///< m
-  PilotSticks sticks_;
+  Pilot pilot_;
   Reference reference_;
   Wrench wanted_;
   Persistence throttleLow_;
@@ -336,7 +348,6 @@ class UgglanFlight {
   bool fieldIsNew_ = false;
   bool aligned_ = false;
   bool grounded_ = true;
-  bool armSwitchWasOn_ = true;  ///< so that a switch held through power-up is no edge
 };
 
 }  // namespace strix

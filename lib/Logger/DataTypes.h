@@ -20,6 +20,7 @@ using LogTime = std::uint64_t;
 namespace topic {
 
 using std::int32_t;
+using std::uint16_t;
 using std::uint32_t;
 using std::uint64_t;
 using std::uint8_t;

@@ -11,6 +11,20 @@
 
 namespace strix {
 
+/// A setting, as the header has it.
+struct LogParameter {
+  std::string_view name;
+  float value = 0.0F;
+};
+
+/// Settings one at a time, so that nobody needs a list of them.
+struct LogParameters {
+  std::size_t count = 0;  ///< kMost at most
+  LogParameter (*at)(const void* owner, std::size_t index) = nullptr;
+  const void* owner = nullptr;
+  static constexpr std::size_t kMost = 64;
+};
+
 /// What the header says about the aircraft. Texts must outlive the logger; empty ones are left out.
 struct LogIdentity {
   const char* vehicle = "";   ///< e.g. "Quad5in"
@@ -18,6 +32,7 @@ struct LogIdentity {
   const char* version = "";   ///< of the software
   const char* git = "";       ///< commit it was built from, if known
   std::uint32_t bootId = 0;   ///< differs between two logs that may share a card
+  LogParameters parameters{};
 };
 
 /// What the header says of a stream; its ULog msg_id is its place.
@@ -44,7 +59,7 @@ static_assert(kTopicRows.size() == kLogBlockId + std::size_t{1});
 class LogHeader {
  public:
   static constexpr std::size_t kInfos = 5;
-  static constexpr std::size_t kItems = 1 + kInfos + 2 * kTopicRows.size();
+  static constexpr std::size_t kItems = 1 + kInfos + LogParameters::kMost + 2 * kTopicRows.size();
 
   /// The file's first bytes: magic and the log's start, us.
   using FileStart = std::array<std::uint8_t, 16>;
@@ -62,6 +77,13 @@ class LogHeader {
     item -= 1;
     if (item < kInfos) return info(item, identity, append);
     item -= kInfos;
+    if (item < LogParameters::kMost) {
+      const LogParameters& parameters = identity.parameters;
+      if (item >= parameters.count) return;
+      const LogParameter parameter = parameters.at(parameters.owner, item);
+      return append(ulog::parameter(parameter.name, parameter.value));
+    }
+    item -= LogParameters::kMost;
     if (item < kTopicRows.size()) {  // all formats stand before the first subscription
       const TopicRow& row = kTopicRows[item];
       if (row.instance == 0) append(ulog::format(row.format));  // instances share it
@@ -76,8 +98,8 @@ class LogHeader {
   [[nodiscard]] static constexpr std::size_t maxSize() {
     constexpr std::size_t kSystem =
         ulog::kMessageHeader + 1 + std::string_view("char[5] sys_nameStrix").size();
-    std::size_t size =
-        sizeof(FileStart) + ulog::kMessageHeader + 40 + kSystem + (kInfos - 1) * ulog::kMaxInfo;
+    std::size_t size = sizeof(FileStart) + ulog::kMessageHeader + 40 + kSystem +
+                       (kInfos - 1) * ulog::kMaxInfo + LogParameters::kMost * ulog::kMaxParameter;
     for (const TopicRow& row : kTopicRows) {
       if (row.instance == 0) size += ulog::kMessageHeader + row.format.size();
       size += ulog::kMessageHeader + 3 + row.name.size();

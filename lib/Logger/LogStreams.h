@@ -69,6 +69,9 @@ using LogStreams = std::tuple<
     LogStream<topic::BatteryStatus,          0,      10,         1,      2000>,
     LogStream<topic::EscStatus,              0,       5,         1,      2000>,
     LogStream<topic::ManualControlSwitches,  0,       1,         1,     16000>,  // and on change
+    LogStream<topic::InputRc,                0,     143,         1,      2000>,  // iBUS: each 7 ms
+    LogStream<topic::VehicleCommand,         0,      20,         1,      2000>,
+    LogStream<topic::BootStatus,             0,       1,         1,      8000>,  // once
     LogStream<topic::FlightConfig,           0,       1,         1,      8000>,  // once
     LogStream<topic::MissionLeg,             0,       1,         1,     32000>,  // 32 at most, once
     LogStream<topic::VehicleAttitude,        0,     500,         1,      2000>,
@@ -89,6 +92,7 @@ using LogStreams = std::tuple<
     LogStream<topic::ControllerStatus,       0,      50,         1,      2000>,
     LogStream<topic::ActuatorOutputs,        0,     500,         1,      2000>,
     LogStream<topic::FlightState,            0,      10,         1,      4000>,  // and on change
+    LogStream<topic::ManualControlSetpoint,  0,      50,         1,      2000>,
     LogStream<topic::ControlTick,            0,     500,         1,      2000>,
     LogStream<topic::SensorFaults,           0,       1,         1,      8000>,  // and on change
     LogStream<topic::LogStatus,              0,       2,         1,      4000>>;
@@ -96,7 +100,7 @@ using LogStreams = std::tuple<
 
 constexpr std::size_t kLogStreamCount = std::tuple_size_v<LogStreams>;
 static_assert(std::tuple_size_v<decltype(topic::LogStatus::dropped_by_id)> == kLogStreamCount);
-static_assert(sizeof(LogStreams) < std::size_t{380} * 1024,
+static_assert(sizeof(LogStreams) < std::size_t{400} * 1024,
               "the rings share the Teensy's 512 KB RAM2");
 
 /// log_block goes into the stream without a ring, under the id after the last stream's.

@@ -55,6 +55,15 @@ class Logger {
   /// be made durable; the next calls of write do it, ahead of more data.
   void flush(LogTime now);
 
+  /// Asks for all that was logged so far to be made durable as soon as the card can; write() sees
+  /// to it, and nothing waits. saved() is true when it is done.
+  void save() {
+    draining_ = true;
+    paused_ = false;
+    saving_ = Saving::Empties;
+  }
+  [[nodiscard]] bool saved() const { return saving_ == Saving::Done; }
+
   /// Writes all there is and makes it durable, within a time limit. For when the motors are off.
   /// @param clock   returns Micros, which must advance from call to call while the card is busy
   /// @param budget  us. The card's own time for one sector or sync comes on top
@@ -79,14 +88,17 @@ class Logger {
   static constexpr std::uint32_t kMaxFailures = 20;    // at one try each 50 ms: a second
   static constexpr LogTime kLongestBusy = 10'000'000;  // us; 4 s were measured on a sound card
   static_assert(LogHeader::maxSize() + SectorStream<Card>::kBlockEnd <=
-                    SectorStream<Card>::kMaxBlock,
+                    SectorStream<Card>::kMaxFirstBlock,
                 "the header is the first block, with the first records");
 
   // A text fills its record only in part: the size in its header says how far.
   using TextRing = RingBuffer<ulog::kMessageHeader + 1 + sizeof(LogTime) + kTextLength, 32>;
   static_assert(TextRing::kRecordSize <= ulog::kMaxMessage);
 
+  enum class Saving : std::uint8_t { Done, Empties, Syncs };
+
   void step(LogTime now);
+  void goOnSaving();
   void fillSector(LogTime now);
   bool takeFromRings(LogTime now);
   void takeText(LogTime now);
@@ -116,7 +128,8 @@ class Logger {
   bool syncing_ = false;   // the block is closed: partial sector, then sync
   bool settling_ = false;  // the card is busy with a sync
   bool paused_ = false;    // after a failure, until the next write period
-  bool stalled_ = false;   // the card keeps us waiting since stalledSince_
+  Saving saving_ = Saving::Done;
+  bool stalled_ = false;  // the card keeps us waiting since stalledSince_
   LogTime stalledSince_ = 0;
   std::uint32_t longestStall_ = 0;  // us
   std::uint32_t failures_ = 0;
@@ -135,6 +148,7 @@ void Logger<Card>::begin(LogTime now, const LogIdentity& identity) {
   writeTask_.start(static_cast<Micros>(now));
   syncTask_.start(static_cast<Micros>(now));
   draining_ = syncAsked_ = syncing_ = settling_ = paused_ = stalled_ = false;
+  saving_ = Saving::Done;
   longestStall_ = failures_ = failuresInARow_ = 0;
 }
 
@@ -167,6 +181,18 @@ void Logger<Card>::write(LogTime now) {
     paused_ = false;
   }
   if (!paused_) step(now);
+  if (saving_ != Saving::Done) goOnSaving();
+}
+
+/// First the rings into the stream, then a sync of all of it.
+template <class Card>
+void Logger<Card>::goOnSaving() {
+  if (saving_ == Saving::Empties && !draining_) {
+    syncAsked_ = true;
+    saving_ = Saving::Syncs;
+  } else if (saving_ == Saving::Syncs && !syncAsked_ && !syncing_ && !settling_) {
+    saving_ = Saving::Done;
+  }
 }
 
 template <class Card>

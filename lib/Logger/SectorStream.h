@@ -17,7 +17,8 @@ namespace strix {
 template <class Card>
 class SectorStream {
  public:
-  static constexpr std::size_t kMaxBlock = 4096;  ///< bytes, log_block message included
+  static constexpr std::size_t kMaxBlock = 4096;       ///< bytes, log_block message included
+  static constexpr std::size_t kMaxFirstBlock = 8192;  ///< of the first, which has the header
   static constexpr std::size_t kBlockEnd =
       ulog::kDataHeader + kPayloadSize<topic::LogBlock>;  ///< bytes of a log_block message
   static_assert(ulog::kMaxMessage + kBlockEnd <= kSectorSize, "fits behind an unfinished sector");
@@ -55,7 +56,8 @@ class SectorStream {
   /// Bytes of messages that the block takes before it must be closed.
   [[nodiscard]] std::size_t blockRoom() const {
     const std::size_t taken = blockLength_ + kBlockEnd;
-    return taken < kMaxBlock ? kMaxBlock - taken : 0;
+    const std::size_t most = sequence_ == 0 ? kMaxFirstBlock : kMaxBlock;
+    return taken < most ? most - taken : 0;
   }
 
   /// Adds whole messages to a sector that is not full; only the last may reach beyond its end.

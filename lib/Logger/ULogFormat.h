@@ -92,4 +92,18 @@ constexpr std::size_t kMaxInfo = kMessageHeader + 1 + 9 + kMaxInfoKey + kMaxInfo
   return message.addText(value);
 }
 
+/// A parameter's name is cut at this length; kMaxParameter is the longest message then.
+constexpr std::size_t kMaxParameterName = 16;
+constexpr std::size_t kMaxParameter =
+    kMessageHeader + 1 + std::string_view("float ").size() + kMaxParameterName + sizeof(float);
+
+/// 'P': a value that was set before the log began.
+[[nodiscard]] inline Message parameter(std::string_view name, float value) {
+  constexpr std::string_view kType = "float ";
+  name = name.substr(0, kMaxParameterName);
+  Message message('P');
+  message.add(static_cast<std::uint8_t>(kType.size() + name.size())).addText(kType).addText(name);
+  return message.add(value);
+}
+
 }  // namespace strix::ulog

@@ -10,6 +10,11 @@ using Micros = std::uint32_t;
 /// Microseconds from `then` to `now`, right across the wrap as long as less than 71.6 min passed.
 [[nodiscard]] constexpr Micros elapsed(Micros now, Micros then) { return now - then; }
 
+/// For settings, which people give in seconds; up to 71 min.
+[[nodiscard]] constexpr Micros toMicros(float seconds) {
+  return static_cast<Micros>(seconds * 1e6F);
+}
+
 /// A short duration as seconds, for use in equations only.
 [[nodiscard]] constexpr float toSeconds(Micros duration) {
   return static_cast<float>(duration) * 1e-6F;

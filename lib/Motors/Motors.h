@@ -112,6 +112,16 @@ class Motors {
     achieved_ = allocation_.wrenchOf(squares);
   }
 
+  /// One motor of an armed aircraft on the bench, the others off.
+  /// @param share  0 to 1 of the ESC's range
+  void commandOne(std::size_t motor, float share) {
+    stop();
+    if (!armed_ || motor >= kMotorCount || !(share > 0.0F)) return;
+    const float range = vehicle_.commandMax - vehicle_.commandOff;
+    commands_[motor] = clamp(vehicle_.commandOff + share * range, vehicle_.commandOff,
+                             vehicle_.commandFlightMax);
+  }
+
   /// Squared speeds for a finite wrench: exact when they can be within the limits; otherwise roll
   /// and pitch torque are kept first, then thrust, then yaw torque; no torque changes its sign.
   [[nodiscard]] SquaredSpeeds allocateControl(const Wrench& wanted) const {
@@ -154,6 +164,23 @@ class Motors {
   /// Factor on a rotor's speed in its command: above 1 with a battery below the command curve's.
   [[nodiscard]] float supply() const { return factor_; }
 
+  /// Of one motor's command: 0 off, 1 the ESC's maximum.
+  [[nodiscard]] float shareOf(std::size_t motor) const {
+    return (commands_[motor] - vehicle_.commandOff) / (vehicle_.commandMax - vehicle_.commandOff);
+  }
+
+  /// Of the slowest and the fastest motor: 0 at the lowest command of flight, 1 at its cap.
+  [[nodiscard]] float lowestShare() const {
+    float lowest = commands_[0];
+    for (const float command : commands_) lowest = smaller(lowest, command);
+    return share(lowest);
+  }
+  [[nodiscard]] float highestShare() const {
+    float highest = commands_[0];
+    for (const float command : commands_) highest = larger(highest, command);
+    return share(highest);
+  }
+
   /// Wrenches that were not plausible, since the start.
   [[nodiscard]] std::uint32_t invalid() const { return invalid_; }
 
@@ -166,6 +193,9 @@ class Motors {
   /// False for NaN and beyond any sense (N or N m); what is left overflows nowhere.
   [[nodiscard]] static bool plausible(float value) { return value > -1e6F && value < 1e6F; }
 
+  [[nodiscard]] float share(float command) const {
+    return (command - commandMin_) / (vehicle_.commandFlightMax - commandMin_);
+  }
   [[nodiscard]] static float smaller(float a, float b) { return b < a ? b : a; }
   [[nodiscard]] static float larger(float a, float b) { return b > a ? b : a; }
   [[nodiscard]] static float clamp(float v, float low, float high) {

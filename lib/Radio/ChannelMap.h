@@ -1,18 +1,10 @@
 /// What the pilot's channels mean.
 #pragma once
 
+#include "PilotInput.h"
 #include "RadioChannels.h"
 
 namespace strix {
-
-/// Who flies how much, lowest help first.
-enum class PilotMode : std::uint8_t {
-  Attitude,      ///< sticks are tilt, yaw rate and thrust
-  AltitudeHold,  ///< sticks are tilt, yaw rate and climb
-  PositionHold,  ///< sticks are velocity and yaw rate
-  Stand,         ///< the attitude stand's sequence
-  Mission,       ///< the mission, or the way home
-};
 
 /// Channels count from 0. The sticks are in the order of most transmitters: aileron, elevator,
 /// throttle, rudder; right, forward and up are the longer pulses.
@@ -34,19 +26,6 @@ struct ChannelMapConfig {
   /// us: no transmitter sends pulses beyond these, a broken link does.
   std::uint16_t shortest = 800;
   std::uint16_t longest = 2200;
-};
-
-/// The pilot's wishes at one instant.
-struct PilotInput {
-  float roll = 0.0F;      ///< -1 to 1, right positive
-  float pitch = 0.0F;     ///< -1 to 1, pulled back positive: nose up
-  float yaw = 0.0F;       ///< -1 to 1, right positive
-  float throttle = 0.0F;  ///< 0 to 1
-  bool arm = false;
-  bool kill = false;
-  bool start = false;
-  PilotMode mode = PilotMode::Attitude;
-  bool valid = false;  ///< every channel above was there, with a pulse that can be
 };
 
 /// Sticks are scaled; switches have a width that they must be moved by.

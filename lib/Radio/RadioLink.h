@@ -18,6 +18,8 @@ class RadioLink {
  public:
   explicit RadioLink(const RadioLinkConfig& config = {}) : config_(config) {}
 
+  void configure(const RadioLinkConfig& config) { config_ = config; }
+
   void add(const RadioChannels& channels, Micros now) {
     (void)lost(now);
     if (channels.failsafe) lose();

@@ -33,6 +33,8 @@ class BatteryMonitor {
   /// slowly.
   [[nodiscard]] float voltage() const { return voltage_; }
 
+  [[nodiscard]] std::uint8_t cells() const { return static_cast<std::uint8_t>(cells_); }
+
   /// Readings that no LiPo of this many cells can give.
   [[nodiscard]] std::uint32_t invalid() const { return invalid_; }
 

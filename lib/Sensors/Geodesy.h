@@ -66,8 +66,27 @@ class LocalFrame {
             static_cast<float>(down) * 1e-3F};
   }
 
+  /// The inverse, to the nearest unit.
+  /// @param ned  m, within tens of kilometres
+  [[nodiscard]] GeoPoint toGeo(const Vector3f& ned) const {
+    constexpr std::int64_t kTurn = 3'600'000'000;
+    std::int64_t longitude = origin_.longitude + rounded(ned.y() / eastPerUnit_);
+    if (longitude > kTurn / 2) longitude -= kTurn;
+    if (longitude < -kTurn / 2) longitude += kTurn;
+    return {origin_.latitude + rounded(ned.x() / northPerUnit_),
+            static_cast<std::int32_t>(longitude), origin_.altitude - rounded(ned.z() * 1e3F)};
+  }
+
  private:
   static constexpr float kUnit = 1e-7F * kDegToRad;  // rad per 1e-7 deg
+
+  /// Of what no flight reaches, a number that is still one on the earth's scale.
+  [[nodiscard]] static std::int32_t rounded(float value) {
+    constexpr float kMost = 1e8F;
+    if (!(value > -kMost)) return static_cast<std::int32_t>(-kMost);
+    if (!(value < kMost)) return static_cast<std::int32_t>(kMost);
+    return static_cast<std::int32_t>(value + (value < 0.0F ? -0.5F : 0.5F));
+  }
 
   GeoPoint origin_;
   float northPerUnit_ = 0.0F;  ///< m per 1e-7 deg

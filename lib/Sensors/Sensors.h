@@ -192,6 +192,7 @@ class Sensors {
     gyroBias_ = gyroBias;
     groundPressure_ = groundPressure;
   }
+  [[nodiscard]] float groundPressure() const { return groundPressure_; }  ///< Pa
   void setOrigin(const GeoPoint& origin) { frame_ = LocalFrame(origin); }
 
   [[nodiscard]] const GeoPoint& origin() const { return frame_.origin(); }

@@ -63,6 +63,12 @@ class StartCalibration {
     if (!done_ && pressure > 0.0F && isFinite(pressure)) pressure_.add({pressure, 0.0F, 0.0F});
   }
 
+  /// Once more, from the next samples on.
+  void begin() {
+    restart();
+    done_ = false;
+  }
+
   [[nodiscard]] bool done() const { return done_; }
   [[nodiscard]] std::uint32_t restarts() const { return restarts_; }
   [[nodiscard]] const Vector3f& accel() const { return accel_.mean(); }

@@ -46,12 +46,21 @@ class EscPulses {
 
   /// Takes effect when the running period ends. Bound: 2 us.
   void write(const EscCommands& commands) {
-    for (std::size_t i = 0; i < kMotorCount; ++i) send(i, pulse(commands[i]));
+    turning_ = false;
+    for (std::size_t i = 0; i < kMotorCount; ++i) {
+      const float wanted = pulse(commands[i]);
+      turning_ = turning_ || wanted > kOff;
+      send(i, wanted);
+    }
   }
 
   void stop() {
+    turning_ = false;
     for (std::size_t i = 0; i < kMotorCount; ++i) send(i, kOff);
   }
+
+  /// A motor was told to turn.
+  [[nodiscard]] bool turning() const { return turning_; }
 
   /// The PWM pulse that a command becomes: off below the range, full above it; and off for what
   /// cannot be meant as a pulse width (NaN, or the int16 of a vehicle with other ESCs).
@@ -85,6 +94,8 @@ class EscPulses {
   static void send(std::size_t motor, float pulse_us) {
     analogWrite(pins::kEsc[motor], static_cast<int>(analogValue(counts(pulse_us))));
   }
+
+  bool turning_ = false;
 };
 
 using EscPwm = EscPulses<kEscProtocol>;

@@ -24,9 +24,17 @@ constexpr std::uint8_t kImuDataReady = 20;
 /// Magnetometer and barometer (LPI2C3, Wire1).
 constexpr I2cPins kSlowBus{17, 16};
 
-/// GPS: Serial2. Serial1 (0, 1) is left for a receiver, Serial8 (34, 35) for telemetry.
+/// GPS: Serial2.
 constexpr std::uint8_t kGpsRx = 7;
 constexpr std::uint8_t kGpsTx = 8;
+
+/// Radio receiver: Serial1. Its other pin (1) belongs to the port and stays unconnected.
+constexpr std::uint8_t kRadioRx = 0;
+constexpr std::uint8_t kRadioTx = 1;
+
+/// Telemetry radio: Serial8.
+constexpr std::uint8_t kTelemetryRx = 34;
+constexpr std::uint8_t kTelemetryTx = 35;
 
 /// Only for an airframe whose ESCs answer over I2C (LPI2C4, Wire2): docs/board.md.
 constexpr I2cPins kEscBus{25, 24};

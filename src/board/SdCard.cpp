@@ -48,13 +48,16 @@ std::uint32_t numberOf(const char* name) {
 
 bool SdCard::begin() {
   writable_ = false;
-  if (!sd_.begin(SdioConfig(kTransfer))) return false;
+  alive_ = sd_.begin(SdioConfig(kTransfer));
+  if (!alive_) return false;
   readMission();
-  const std::uint32_t newest = newestLogNumber();
+  listLogs();
+  const std::uint32_t newest = logCount_ == 0 ? 0 : logs_[logCount_ - 1].number;
   if (newest >= kMaxLogNumber) return false;
-  if (newest > 0) cutToWritten(newest);
+  if (newest > 0) cutToWritten(logs_[logCount_ - 1]);
   if (!allocate(newest + 1)) return false;
   logNumber_ = newest + 1;
+  list({logNumber_, 0});
   held_ = kNone;
   heldIsNew_ = open_ = filled_ = stopAsked_ = false;
   writable_ = true;
@@ -70,26 +73,41 @@ void SdCard::readMission() {
   file.close();
 }
 
-std::uint32_t SdCard::newestLogNumber() {
-  std::uint32_t newest = 0;
+void SdCard::listLogs() {
+  logCount_ = 0;
   FsFile root;
   FsFile entry;
-  if (!root.open("/", O_RDONLY)) return 0;
+  if (!root.open("/", O_RDONLY)) return;
   while (entry.openNext(&root, O_RDONLY)) {
     char name[24] = {};
     entry.getName(name, sizeof name);
-    newest = std::max(newest, numberOf(name));
+    const std::uint32_t number = numberOf(name);
+    if (number != 0) list({number, static_cast<std::uint32_t>(entry.fileSize())});
     entry.close();
   }
-  return newest;
+}
+
+/// In its place by number; the oldest one goes when there is no room.
+void SdCard::list(const Listed& log) {
+  std::size_t at = logCount_;
+  while (at > 0 && logs_[at - 1].number > log.number) --at;
+  if (logCount_ == kListed) {
+    if (at == 0) return;
+    std::copy(logs_.begin() + 1, logs_.begin() + at, logs_.begin());
+    logs_[at - 1] = log;
+    return;
+  }
+  std::copy_backward(logs_.begin() + at, logs_.begin() + logCount_, logs_.begin() + logCount_ + 1);
+  logs_[at] = log;
+  ++logCount_;
 }
 
 /// Without finish a file keeps its allocated size. The log is written in order onto erased sectors,
 /// so its end is found by halving; where a card did not erase, the file is cut later, never
 /// earlier.
-void SdCard::cutToWritten(std::uint32_t number) {
+void SdCard::cutToWritten(Listed& log) {
   FsFile file;
-  if (!file.open(FileName(number).text, O_RDWR)) return;
+  if (!file.open(FileName(log.number).text, O_RDWR)) return;
   std::uint32_t first = 0;
   std::uint32_t last = 0;
   const std::uint64_t size = file.fileSize();
@@ -106,6 +124,7 @@ void SdCard::cutToWritten(std::uint32_t number) {
       }
     }
     file.truncate(static_cast<std::uint64_t>(blank - first) * kSectorSize);
+    log.bytes = static_cast<std::uint32_t>(file.fileSize());
   }
   file.close();
 }
@@ -154,12 +173,21 @@ bool SdCard::makeValid(std::uint64_t size) {
 
 bool SdCard::busy() {
   if (!writable_) return false;
+  if (turn_.over(::micros())) endReading();
+  if (turn_.reading()) return true;
   if (filled_ && (SDHC_IRQSTAT & (SDHC_IRQSTAT_TC | kTransferErrors)) == 0) return true;
   if (!filled_ && sd_.card()->isBusy()) return true;
   if (!stopAsked_) return false;
+  return transferEnded() && sd_.card()->isBusy();
+}
+
+/// Ends the transfer of sectors in a row; the card then programs all it has. Not to be asked while
+/// a sector is on its way. False: the card failed.
+bool SdCard::transferEnded() {
   stopAsked_ = open_ = false;
-  writable_ = sectorTaken() && sdio().stopTransmission(false);
-  return writable_ && sd_.card()->isBusy();
+  alive_ = sectorTaken() && sdio().stopTransmission(false);
+  writable_ = writable_ && alive_;
+  return alive_;
 }
 
 bool SdCard::writeSector(std::uint32_t index, const std::uint8_t (&data)[kSectorSize]) {
@@ -181,6 +209,7 @@ bool SdCard::sync(std::uint32_t /*length*/) {
 
 bool SdCard::flushHeld() {
   if (!heldIsNew_) return true;
+  if (turn_.reading()) endReading();
   const std::uint32_t sector = firstSector_ + held_;
   if (kFifo) {
     writable_ = (open_ || sdio().writeStart(sector)) && fillFifo();
@@ -189,7 +218,51 @@ bool SdCard::flushHeld() {
     writable_ = sd_.card()->writeSector(sector, sector_.data());
   }
   heldIsNew_ = false;
+  alive_ = writable_;
   return writable_;
+}
+
+std::uint32_t SdCard::handedOver() const {
+  return held_ == kNone ? 0 : held_ * static_cast<std::uint32_t>(kSectorSize);
+}
+
+bool SdCard::logInfo(std::size_t index, std::uint32_t& number, std::uint32_t& bytes) const {
+  if (index >= logCount_) return false;
+  number = logs_[index].number;
+  bytes = number == logNumber_ ? handedOver() : logs_[index].bytes;
+  return true;
+}
+
+std::size_t SdCard::readLog(std::uint32_t number, std::uint32_t offset, std::uint8_t* out,
+                            std::size_t most) {
+  if (!alive_) return 0;
+  if (!turn_.take(::micros())) {
+    if (turn_.reading()) endReading();
+    return 0;
+  }
+  // What is being written goes first: its sector, the end of its transfer, the card's programming.
+  if (filled_ && (SDHC_IRQSTAT & (SDHC_IRQSTAT_TC | kTransferErrors)) == 0) return 0;
+  if (open_ && !transferEnded()) return 0;
+  if (!readOpen_ && sd_.card()->isBusy()) return 0;
+  readOpen_ = true;
+  if (number != readingNumber_) {
+    reading_.close();
+    readingNumber_ = reading_.open(FileName(number).text, O_RDONLY) ? number : 0;
+    if (readingNumber_ == 0) return 0;
+  }
+  if (number == logNumber_) {
+    if (offset >= handedOver()) return 0;
+    most = std::min<std::size_t>(most, handedOver() - offset);
+  }
+  if (!reading_.seekSet(offset)) return 0;
+  const int count = reading_.read(out, most);
+  return count > 0 ? static_cast<std::size_t>(count) : 0;
+}
+
+void SdCard::endReading() {
+  if (readOpen_) (void)sd_.card()->syncDevice();  // a write would meet the transfer still open
+  readOpen_ = false;
+  turn_.end(::micros());
 }
 
 /// begin started it with an SdioConfig, so it is one.

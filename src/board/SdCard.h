@@ -10,6 +10,8 @@
 #include "BlockDevice.h"
 #include "MissionText.h"
 
+#include "ReadingTurn.h"
+
 #include <Arduino.h>
 #include <SdFat.h>
 
@@ -46,7 +48,28 @@ class SdCard {
   /// Number in this start's file name; 0 without a card.
   [[nodiscard]] std::uint32_t logNumber() const { return logNumber_; }
 
+  /// The newest kListed logs, the oldest of them first, the running one last. As begin() found
+  /// them: the card is not asked.
+  [[nodiscard]] std::size_t logCount() const { return logCount_; }
+  [[nodiscard]] bool logInfo(std::size_t index, std::uint32_t& number, std::uint32_t& bytes) const;
+
+  /// Bytes of a log; of the running one what has been handed over. The log that is being written
+  /// waits meanwhile, in turns (ReadingTurn.h). Only with the motors off: takes 1 ms, 10 ms when it
+  /// opens a file; bound: SdFat's 1 s.
+  /// @return how many; 0: not now, or not at all
+  [[nodiscard]] std::size_t readLog(std::uint32_t number, std::uint32_t offset, std::uint8_t* out,
+                                    std::size_t most);
+
+  /// The card is the running log's again. Bound: SdFat's 1 s, 0.1 ms with a card that answers.
+  void endReading();
+
  private:
+  struct Listed {
+    std::uint32_t number = 0;
+    std::uint32_t bytes = 0;
+  };
+  static constexpr std::size_t kListed = 64;
+
   using Sector = std::array<std::uint8_t, kSectorSize>;
   static constexpr std::uint64_t kFileSize = 512ULL * 1024 * 1024;
   static constexpr std::uint64_t kLeastFileSize = 32ULL * 1024 * 1024;
@@ -55,12 +78,15 @@ class SdCard {
   static constexpr std::uint32_t kNone = 0xFFFFFFFF;
 
   void readMission();
-  [[nodiscard]] std::uint32_t newestLogNumber();
-  void cutToWritten(std::uint32_t number);
+  void listLogs();
+  void list(const Listed& log);
+  void cutToWritten(Listed& log);
   [[nodiscard]] bool isBlank(std::uint32_t sector);
   [[nodiscard]] bool allocate(std::uint32_t number);
   [[nodiscard]] bool makeValid(std::uint64_t size);
   [[nodiscard]] bool flushHeld();
+  [[nodiscard]] bool transferEnded();
+  [[nodiscard]] std::uint32_t handedOver() const;
   [[nodiscard]] SdioCard& sdio();
   [[nodiscard]] bool fillFifo();
   [[nodiscard]] bool sectorTaken();
@@ -75,9 +101,16 @@ class SdCard {
   bool open_ = false;              // a transfer of sectors in a row has begun
   bool filled_ = false;            // a sector is on its way from the FIFO
   bool stopAsked_ = false;         // the transfer is to be ended when the card is ready
-  bool writable_ = false;
+  bool alive_ = false;             // it has not failed since begin
+  bool writable_ = false;          // and there is a file for the log
   std::array<char, mission_text::kMostBytes + 1> mission_{};
   std::size_t missionSize_ = 0;
+  std::array<Listed, kListed> logs_{};  // by number, the newest last
+  std::size_t logCount_ = 0;
+  ReadingTurn turn_;
+  FsFile reading_;
+  std::uint32_t readingNumber_ = 0;  // of the file in reading_; 0: none
+  bool readOpen_ = false;            // a transfer from the card has begun
   alignas(4) Sector sector_{};
 };
 

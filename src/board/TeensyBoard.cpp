@@ -1,9 +1,13 @@
 #include "TeensyBoard.h"
 
+#include "Faults.h"
+
 namespace strix {
 
 SensorSet TeensyBoard::begin() {
+  catchFaults();
   esc_.begin();
+  reset_ = takeResetStatus();
   battery_.begin();
   arm_.begin();
   kill_.begin();
@@ -42,6 +46,13 @@ void TeensyBoard::countFaults(SensorFaultCounts& out) const {
   out[SensorFault::ImuBusFreed] = imuBus_.faults().freed;
   out[SensorFault::SlowBusHeld] = held(slowBus_);
   out[SensorFault::SlowBusFreed] = slowBus_.faults().freed;
+}
+
+void TeensyBoard::rememberMotors(bool on) {
+  armed_ = on;
+  RetainedMotors::remember(on);
+  watchdog_.run(motorsOn());
+  if (on) card_.endReading();
 }
 
 PilotSwitches TeensyBoard::readPilot() {

@@ -1,6 +1,7 @@
 /// The aircraft's Board (lib/FlightSoftware/Board.h): a Teensy 4.1 with its sensors, ESCs and card.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
@@ -16,8 +17,12 @@
 #include "ImuIcm20649.h"
 #include "MagLis2mdl.h"
 #include "Pins.h"
+#include "RadioReceiver.h"
+#include "Reset.h"
 #include "SdCard.h"
+#include "Storage.h"
 #include "Switch.h"
+#include "Watchdog.h"
 
 namespace strix {
 
@@ -44,8 +49,10 @@ class TeensyBoard {
   [[nodiscard]] bool readBattery(BatteryRaw& out) { return battery_.read(out); }
   /// ESCs by pulse width do not answer; EscI2c's do.
   [[nodiscard]] static bool readEscStatus(EscRaw& /*out*/) { return false; }
-  /// No receiver yet.
-  [[nodiscard]] static PilotSticks readSticks() { return {}; }
+
+  void beginRadio(RadioProtocol protocol) { radio_.begin(protocol); }
+  [[nodiscard]] bool readRadio(RadioChannels& out) { return radio_.read(out); }
+  [[nodiscard]] std::uint32_t radioOverflows() const { return radio_.overflows(); }
 
   [[nodiscard]] std::string_view missionText() const { return card_.missionText(); }
 
@@ -55,9 +62,42 @@ class TeensyBoard {
 
   void writeEsc(const EscCommands& commands) { esc_.write(commands); }
 
+  /// The watchdog runs while motors are armed or turn; on the ground it is off: Watchdog.h.
+  void feedWatchdog() {
+    watchdog_.run(motorsOn());
+    watchdog_.feed();
+  }
+  [[nodiscard]] const Watchdog& watchdog() const { return watchdog_; }
+
+  /// As begin() found it.
+  [[nodiscard]] ResetStatus resetStatus() const { return reset_; }
+  void rememberMotors(bool on);
+
+  static constexpr std::size_t kStorageBytes = Storage::kBytes;
+  static void readStorage(std::size_t offset, std::uint8_t* data, std::size_t size) {
+    Storage::read(offset, data, size);
+  }
+  /// Refused with the motors on: it may take 0.6 s.
+  [[nodiscard]] bool writeStorage(std::size_t offset, const std::uint8_t* data, std::size_t size) {
+    return !motorsOn() && Storage::write(offset, data, size);
+  }
+
   [[nodiscard]] SdCard& card() { return card_; }
 
+  // The card's logs, for the console: SdCard.h.
+  [[nodiscard]] std::size_t logCount() const { return card_.logCount(); }
+  [[nodiscard]] bool logInfo(std::size_t index, std::uint32_t& number, std::uint32_t& bytes) const {
+    return card_.logInfo(index, number, bytes);
+  }
+  /// Nothing with the motors on.
+  [[nodiscard]] std::size_t readLog(std::uint32_t number, std::uint32_t offset, std::uint8_t* out,
+                                    std::size_t most) {
+    return motorsOn() ? 0 : card_.readLog(number, offset, out, most);
+  }
+
  private:
+  [[nodiscard]] bool motorsOn() const { return armed_ || esc_.turning(); }
+
   EscPwm esc_;
   Battery battery_{pins::kBattery, pins::kBatteryRatio};
   Switch arm_{pins::kArmSwitch, false};
@@ -69,7 +109,11 @@ class TeensyBoard {
   MagLis2mdl mag_{slowBus_};
   BaroBmp390 baro_{slowBus_};
   GpsMtk3333 gps_{Serial2};
+  RadioReceiver radio_{Serial1};
   SdCard card_;
+  Watchdog watchdog_;
+  ResetStatus reset_;
+  bool armed_ = false;
   std::uint32_t bootId_ = 0;
 };
 

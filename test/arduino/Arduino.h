@@ -8,6 +8,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <vector>
 
 #include "FakeFlexPwm.h"
 #include "FakeTeensy.h"
@@ -78,4 +80,37 @@ inline void attachInterrupt(std::uint8_t pin, void (*function)(), int /*mode*/) 
   strix::fakeTeensy().pin(pin).isr = function;
 }
 
+/// The USB's serial line with a terminal that takes what is sent when the test lets it.
+class FakeUsbSerial {
+ public:
+  bool terminal = false;  ///< somebody has opened the line
+  std::size_t space = 8192;
+  std::deque<std::uint8_t> typed;
+  std::vector<std::uint8_t> shown;
+  unsigned waits = 0;  ///< writes that had to wait, up to 120 ms each
+
+  explicit operator bool() const { return terminal; }
+  int availableForWrite() const { return static_cast<int>(space); }
+  int read() {
+    if (typed.empty()) return -1;
+    const int byte = typed.front();
+    typed.pop_front();
+    return byte;
+  }
+  std::size_t write(const std::uint8_t* data, std::size_t size) {
+    if (size > space) {
+      ++waits;
+      delay(120);
+      size = space;
+    }
+    space -= size;
+    shown.insert(shown.end(), data, data + size);
+    return size;
+  }
+};
+
+inline FakeUsbSerial Serial;
+
+#include "HardwareSerial.h"
 #include "Lpi2cRegisters.h"
+#include "SystemRegisters.h"

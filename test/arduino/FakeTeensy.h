@@ -10,6 +10,7 @@
 #include "FakeClock.h"
 #include "FakeI2cWire.h"
 #include "FakeLpi2c.h"
+#include "FakeWatchdog.h"
 
 namespace strix {
 
@@ -20,6 +21,19 @@ struct FakePin {
   bool latch = false;       ///< what digitalWrite was told
   bool level = true;        ///< that the world gives it
   void (*isr)() = nullptr;  ///< on a rising edge
+};
+
+/// What the reset controller knows of the last reset: a power-up.
+struct FakeReset {
+  std::uint32_t causes = 1;  ///< SRSR
+  std::uint32_t word = 0;    ///< GPR5
+  bool crashed = false;      ///< the core has kept a fault's record
+};
+
+/// The registers of SNVS: supplied by a cell or by what is left of the 3.3 V.
+struct FakeRetained {
+  std::uint32_t control = 0;  ///< LPCR
+  std::uint32_t word = 0;     ///< LPGPR2
 };
 
 /// One I2C master, its pads, and the wire they are soldered to.
@@ -50,6 +64,9 @@ class FakeTeensy {
   // (pjrc.com, "Teensy 4.1 pins"; Wire and Wire1 with their first choice of pins).
   FakeI2cPort lpi2c1{clock, 18, 19};
   FakeI2cPort lpi2c3{clock, 17, 16};
+  FakeWatchdog watchdog{clock};
+  FakeReset reset;
+  FakeRetained retained;
 
   [[nodiscard]] FakePin& pin(std::size_t number) { return pins_.at(number); }
 

@@ -1,6 +1,8 @@
 /// A Board for tests: clock, devices, switches and card do what the test says.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <string_view>
 #include <vector>
 
@@ -61,7 +63,9 @@ class BasicFakeBoard {
   FakeDevice<GpsRaw> gps{100'000};
   SensorSet found{true, true, true, true, true};  ///< what begin() reports
   PilotSwitches pilot;
-  PilotSticks sticks;
+  std::vector<RadioChannels> radio;  ///< frames to come, one a reading
+  ResetStatus reset;
+  std::array<std::uint8_t, 4284> storage = erased();
   FakeDevice<BatteryRaw> battery{100'000};
   FakeDevice<EscRaw> escs{200'000};
   const char* mission = "";  ///< mission.txt on the card
@@ -74,6 +78,9 @@ class BasicFakeBoard {
   // Read by the test.
   std::uint32_t clockReads = 0;
   std::vector<EscWrite> escWrites;
+  std::uint32_t watchdogFed = 0;
+  bool motorsRemembered = false;
+  RadioProtocol radioProtocol = RadioProtocol::None;
 
   /// @param start  what micros() returns first
   explicit BasicFakeBoard(Micros start = 0) : start_(start) {
@@ -123,7 +130,24 @@ class BasicFakeBoard {
   [[nodiscard]] bool readGps(GpsRaw& out) { return gps.read(time_, start_, out); }
   [[nodiscard]] bool readBattery(BatteryRaw& out) { return battery.read(time_, start_, out); }
   [[nodiscard]] bool readEscStatus(EscRaw& out) { return escs.read(time_, start_, out); }
-  [[nodiscard]] PilotSticks readSticks() const { return sticks; }
+  void beginRadio(RadioProtocol protocol) { radioProtocol = protocol; }
+  [[nodiscard]] bool readRadio(RadioChannels& out) {
+    if (radio.empty()) return false;
+    out = radio.front();
+    radio.erase(radio.begin());
+    return true;
+  }
+  void feedWatchdog() { ++watchdogFed; }
+  [[nodiscard]] ResetStatus resetStatus() const { return reset; }
+  void rememberMotors(bool on) { motorsRemembered = on; }
+  static constexpr std::size_t kStorageBytes = 4284;
+  void readStorage(std::size_t offset, std::uint8_t* data, std::size_t size) const {
+    std::copy_n(&storage[offset], size, data);
+  }
+  bool writeStorage(std::size_t offset, const std::uint8_t* data, std::size_t size) {
+    std::copy_n(data, size, &storage[offset]);
+    return true;
+  }
   [[nodiscard]] std::string_view missionText() const { return mission; }
   void countFaults(SensorFaultCounts& out) const { out = faults; }
   [[nodiscard]] PilotSwitches readPilot() const { return pilot; }
@@ -131,6 +155,12 @@ class BasicFakeBoard {
   [[nodiscard]] Card& card() { return sd; }
 
  private:
+  [[nodiscard]] static std::array<std::uint8_t, 4284> erased() {
+    std::array<std::uint8_t, 4284> bytes;
+    bytes.fill(0xFF);
+    return bytes;
+  }
+
   void setCardClock(FakeCard& card) const { card.now = time_; }
   template <class Other>
   void setCardClock(Other& /*card*/) const {}

@@ -9,3 +9,8 @@ void runBaroTests();
 void runSensorFaultTests();
 void runGpsTests();
 void runEscPwmTests();
+void runWatchdogTests();
+void runResetTests();
+void runRadioReceiverTests();
+void runPortTests();
+void runStorageTests();

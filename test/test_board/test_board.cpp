@@ -16,6 +16,11 @@ int main() {
   runSensorFaultTests();
   runGpsTests();
   runEscPwmTests();
+  runWatchdogTests();
+  runResetTests();
+  runRadioReceiverTests();
+  runPortTests();
+  runStorageTests();
   UNITY_END();
   return 0;
 }

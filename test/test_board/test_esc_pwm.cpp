@@ -105,6 +105,23 @@ void test_no_pin_pulses_before_the_start_and_the_flown_protocol_is_pwm() {
   }
 }
 
+void test_any_motor_above_off_is_turning_and_nonsense_is_not() {
+  flexPwm() = FakeFlexPwm{};
+  EscPwm esc;
+  esc.begin();
+  TEST_ASSERT_FALSE(esc.turning());
+  for (std::size_t i = 0; i < kMotorCount; ++i) {
+    EscCommands commands{1150.0F, 0.0F, std::numeric_limits<float>::quiet_NaN(), 2865.0F};
+    esc.write(commands);
+    TEST_ASSERT_FALSE(esc.turning());
+    commands[i] = 1150.1F;
+    esc.write(commands);
+    TEST_ASSERT_TRUE(esc.turning());
+  }
+  esc.stop();
+  TEST_ASSERT_FALSE(esc.turning());
+}
+
 }  // namespace
 
 void runEscPwmTests() {
@@ -114,4 +131,5 @@ void runEscPwmTests() {
   RUN_TEST(test_what_cannot_be_meant_as_a_pulse_is_off_and_too_much_is_full);
   RUN_TEST(test_each_motor_has_its_own_pin_although_two_share_a_counter);
   RUN_TEST(test_no_pin_pulses_before_the_start_and_the_flown_protocol_is_pwm);
+  RUN_TEST(test_any_motor_above_off_is_turning_and_nonsense_is_not);
 }

@@ -19,7 +19,7 @@ constexpr Mission kLowMission{"low", 0.3F, 500'000, 1, {{{0.1F, -0.1F, 0.3F, 0.1
 [[nodiscard]] inline FlightSoftwareConfig lowFlight() {
   FlightSoftwareConfig config = flightConfig(kQuad5in, kQuad5inGainsNoIntegral, kLowMission, 0.07F);
   config.mission.end = MissionEnd::Home;
-  config.guidance.returnHeight = 0.1F;  // no climb
+  config.parameters.returnHeight = 0.1F;  // no climb
   return config;
 }
 

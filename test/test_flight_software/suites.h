@@ -3,6 +3,9 @@
 
 void runArmingTests();
 void runMotorsOffTests();
+void runHazardTests();
+void runPilotTests();
+void runCommandTests();
 void runLoopTests();
 void runBadInputTests();
 void runMissionTests();

@@ -1,5 +1,8 @@
 // From power-up to turning motors, and every reason not to get there.
+#include <cstring>
+
 #include "FakeFlight.h"
+#include "Transmitter.h"
 #include "suites.h"
 
 using namespace strix;
@@ -66,7 +69,7 @@ void test_a_switch_thrown_too_early_must_be_thrown_again() {
 
 /// One reason to refuse, brought about by `spoil` in an aircraft that is otherwise ready.
 struct Refusal {
-  ConditionSet bit;
+  PreArmSet bit;
   void (*configure)(FlightSoftwareConfig&);
   void (*beforePowerUp)(FakeBoard&);
   void (*spoil)(FakeFlight&);
@@ -134,6 +137,35 @@ const Refusal kRefusals[] = {
     {prearm::kKillSwitch, kAsUsual, kAsUsual, [](FakeFlight& f) { f.board.pilot.kill = true; }},
     {prearm::kStartSwitch, kAsUsual, kAsUsual, [](FakeFlight& f) { f.board.pilot.start = true; }},
     {prearm::kLog, kAsUsual, [](FakeBoard& b) { b.found.card = false; }, kAsUsual},
+    {prearm::kRestarted, kAsUsual,
+     [](FakeBoard& b) { b.reset = {reset::kWatchdog, true}; }, kAsUsual},
+    // A set of parameters that was torn: its beginning, and not the rest.
+    {prearm::kParameters, kAsUsual,
+     [](FakeBoard& b) { std::memcpy(b.storage.data(), "STRX", 4); }, kAsUsual},
+    {prearm::kBattery, kAsUsual, kAsUsual,
+     [](FakeFlight& f) {
+       f.board.battery.dead = false;
+       f.board.battery.reading.voltage = 3.3F * 6.0F;
+       f.run(8.0F);
+     }},
+    {prearm::kRadio, [](FlightSoftwareConfig& c) { c.parameters.radioProtocol = 1.0F; }, kAsUsual,
+     kAsUsual},
+    {prearm::kThrottle, kAsUsual, kAsUsual,
+     [](FakeFlight& f) {
+       PilotInput sticks;
+       sticks.valid = true;
+       sticks.throttle = 0.3F;
+       f.board.radio.assign(600, frameOf(sticks));  // one each tick
+       f.run(0.1F);
+     }},
+    {prearm::kKillCommand, kAsUsual, kAsUsual,
+     [](FakeFlight& f) { (void)f.software.command({CommandKind::Kill}); }},
+    {prearm::kOverrun, kAsUsual, kAsUsual,
+     [](FakeFlight& f) {
+       f.passTime = 4500;  // every other control tick is missed
+       f.run(2.5F);
+       f.passTime = 500;
+     }},
     {prearm::kMounting, [](FlightSoftwareConfig& c) { c.sensors.mag.sensorToBody(0, 0) = 1.1F; },
      kAsUsual, kAsUsual},
     {prearm::kMission, [](FlightSoftwareConfig& c) { c.mission.legs[0].north = 31.0F; }, kAsUsual,
@@ -148,7 +180,7 @@ const Refusal kRefusals[] = {
     {prearm::kFence,
      [](FlightSoftwareConfig& c) {
        c.mission.legCount = 0;
-       c.fence.radius = 0.03F;
+       c.parameters.fenceRadius = 0.03F;
      },
      kAsUsual,
      [](FakeFlight& f) {
@@ -158,7 +190,7 @@ const Refusal kRefusals[] = {
 };
 
 void test_each_check_that_fails_refuses_arming_and_says_why() {
-  ConditionSet tested = prearm::kNotCalibrated | prearm::kLayout;  // have tests of their own
+  PreArmSet tested = prearm::kNotCalibrated | prearm::kLayout;  // have tests of their own
   for (const Refusal& refusal : kRefusals) {
     FlightSoftwareConfig config = lowFlight();
     refusal.configure(config);
@@ -175,7 +207,7 @@ void test_each_check_that_fails_refuses_arming_and_says_why() {
     TEST_ASSERT_TRUE_MESSAGE(flight.logSays(sentence), sentence);
     tested |= refusal.bit;
   }
-  TEST_ASSERT_EQUAL_HEX32((ConditionSet{1} << kPreArmChecks.size()) - 1U, tested);
+  TEST_ASSERT_EQUAL_HEX32((PreArmSet{1} << kPreArmChecks.size()) - 1U, tested);
 }
 
 void test_rotors_that_cannot_hold_the_aircraft_level_never_arm() {

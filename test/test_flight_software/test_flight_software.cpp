@@ -9,6 +9,9 @@ int main() {
   UNITY_BEGIN();
   runArmingTests();
   runMotorsOffTests();
+  runHazardTests();
+  runPilotTests();
+  runCommandTests();
   runLoopTests();
   runBadInputTests();
   runMissionTests();

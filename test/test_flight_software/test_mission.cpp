@@ -99,7 +99,7 @@ struct Carried {
     const Micros start = now;
     while (!has(condition::kArrived) && elapsed(now, start) < 60'000'000) {
       now += 2000;
-      const Reference& r = guidance.update(now);
+      const Reference& r = guidance.update(now, state);
       state.positionNed = r.positionNed;
       state.velocityNed = r.velocityNed;
       state.attitude = eulerToQuaternion({0.0F, 0.0F, r.yaw});
@@ -173,7 +173,7 @@ void test_the_landing_goes_straight_down_from_the_last_leg_and_on_below_the_star
   bool belowStart = false;
   for (int i = 0; i < 10'000; ++i) {
     flight.now += 2000;
-    const Reference& r = flight.guidance.update(flight.now);
+    const Reference& r = flight.guidance.update(flight.now, flight.state);
     TEST_ASSERT_FLOAT_WITHIN(0.01F, kFirstFlight.legs[0].north, r.positionNed.x());
     TEST_ASSERT_FLOAT_WITHIN(0.01F, kFirstFlight.legs[0].east, r.positionNed.y());
     TEST_ASSERT_TRUE(r.velocityNed.z() >= 0.0F && r.velocityNed.z() <= 0.5F + 1e-4F);

@@ -102,32 +102,39 @@ void test_disarming_on_the_ground_leads_to_idle_and_in_flight_to_safe() {
   }
 }
 
+/// As lowFlight(), but that nobody tries to come down without an IMU.
+FlightSoftwareConfig neverBlind() {
+  FlightSoftwareConfig config = lowFlight();
+  config.parameters.blindTime = 0.0F;
+  return config;
+}
+
 void test_an_imu_silent_for_more_than_20_ms_stops_the_motors() {
   for (const FlightState state : kMotorStates) {
-    FakeFlight flight;
+    FakeFlight flight(0, neverBlind());
     flight.getReady();
     flight.reach(state);
     flight.board.imu.dead = true;
     flight.run(0.018F);  // the last reading may be a millisecond old
     TEST_ASSERT_TRUE(flight.state() == state);
-    flight.run(0.004F);
+    flight.run(0.006F);  // in flight by way of BLIND, for one tick
     TEST_ASSERT_TRUE(flight.state() == FlightState::Safe);
     TEST_ASSERT_TRUE(flight.software.stateMachine().getCriticalErrorFlag());
     flight.run(0.002F);
     TEST_ASSERT_TRUE(areOff(flight.board.esc()));
-    TEST_ASSERT_TRUE(flight.logSays("IMU lost: motors off"));
+    TEST_ASSERT_TRUE(flight.logSays("IMU lost"));
   }
 }
 
 void test_an_imu_that_gives_only_nan_is_as_good_as_silent() {
-  FakeFlight flight;
+  FakeFlight flight(0, neverBlind());
   flight.getReady();
   flight.reach(FlightState::Hold);
   flight.board.imu.reading.gyro.y() = kNaN;
-  flight.run(0.026F);
+  flight.run(0.028F);
   TEST_ASSERT_TRUE(flight.state() == FlightState::Safe);
   TEST_ASSERT_TRUE(areOff(flight.board.esc()));
-  TEST_ASSERT_TRUE(flight.logSays("IMU lost: motors off"));
+  TEST_ASSERT_TRUE(flight.logSays("IMU lost"));
 }
 
 void test_a_short_silence_of_the_imu_stops_nothing() {
@@ -169,19 +176,23 @@ void test_a_tilt_past_90_deg_stops_the_motors_whichever_way_it_goes() {
   }
 }
 
-void test_leaving_the_fence_stops_the_motors() {
+void test_leaving_the_fence_turns_home_and_ends_in_safe() {
   FlightSoftwareConfig config = lowFlight();
   config.mission.legCount = 0;
   config.mission.takeoffHoldTime = 60'000'000;
-  config.fence.radius = 0.5F;
+  config.parameters.fenceRadius = 0.5F;
   FakeFlight flight(0, config);
   flight.getReady();
   flight.reach(FlightState::Hold);
   flight.board.gps.reading.latitude += 270;  // 3 m north
-  TEST_ASSERT_TRUE(flight.runUntil(FlightState::Safe, 20.0F));
+  TEST_ASSERT_TRUE(flight.runUntil(FlightState::Return, 20.0F));
+  TEST_ASSERT_FLOAT_WITHIN(0.1F, 0.5F, flight.software.estimator().state().positionNed.x());
+  TEST_ASSERT_TRUE(flight.software.stateMachine().getFailsafeFlag());
+  TEST_ASSERT_TRUE(flight.logSays("outside the fence: returning home"));
+  TEST_ASSERT_TRUE(flight.runUntil(FlightState::Land, 20.0F));
+  TEST_ASSERT_TRUE(flight.runUntil(FlightState::Safe, 20.0F));  // not IDLE
   flight.run(0.002F);
   TEST_ASSERT_TRUE(areOff(flight.board.esc()));
-  TEST_ASSERT_TRUE(flight.logSays("outside the fence: motors off"));
 }
 
 void test_a_sick_estimator_stops_the_motors() {
@@ -200,7 +211,7 @@ void test_a_sick_estimator_stops_the_motors() {
 
 void test_one_garbled_reading_is_left_out_and_an_imu_that_gives_no_other_is_lost() {
   for (const float garbage : {1e30F, -40.0F}) {  // rad/s; the range is 34.9
-    FakeFlight flight;
+    FakeFlight flight(0, neverBlind());
     flight.getReady();
     flight.reach(FlightState::Hold);
     flight.board.imu.reading.gyro.y() = garbage;
@@ -211,7 +222,7 @@ void test_one_garbled_reading_is_left_out_and_an_imu_that_gives_no_other_is_lost
     TEST_ASSERT_TRUE(flight.software.sensors().invalid() > 0);
 
     flight.board.imu.reading.gyro.y() = garbage;
-    flight.run(0.026F);  // 20 ms of silence, a sample before it, a tick and a pass
+    flight.run(0.028F);  // 20 ms of silence, a sample before it, two ticks and a pass
     TEST_ASSERT_TRUE(flight.state() == FlightState::Safe);
     TEST_ASSERT_TRUE(areOff(flight.board.esc()));
     TEST_ASSERT_TRUE(
@@ -291,7 +302,7 @@ void runMotorsOffTests() {
   RUN_TEST(test_an_imu_that_gives_only_nan_is_as_good_as_silent);
   RUN_TEST(test_a_short_silence_of_the_imu_stops_nothing);
   RUN_TEST(test_a_tilt_past_90_deg_stops_the_motors_whichever_way_it_goes);
-  RUN_TEST(test_leaving_the_fence_stops_the_motors);
+  RUN_TEST(test_leaving_the_fence_turns_home_and_ends_in_safe);
   RUN_TEST(test_a_sick_estimator_stops_the_motors);
   RUN_TEST(test_one_garbled_reading_is_left_out_and_an_imu_that_gives_no_other_is_lost);
   RUN_TEST(test_a_fault_on_the_way_to_a_sensor_is_named_once_and_again_when_it_comes_back);

@@ -44,7 +44,7 @@ class GuidedFlight {
       guidance.enter(machine.state(), now, state);
       states.push_back(machine.state());
     }
-    const Reference& reference = guidance.update(now);
+    const Reference& reference = guidance.update(now, state);
     if (machine.getControlFlag()) follow(reference);
   }
 

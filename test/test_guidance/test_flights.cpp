@@ -98,7 +98,7 @@ void test_a_corner_waits_for_an_aircraft_that_lags_behind_the_reference() {
   };
   flight.state.positionNed = {8.9F, 0.0F, -3.0F};  // held there while the reference goes on
   for (int i = 0; i < 6000; ++i) {
-    flight.guidance.update(flight.now += GuidedFlight::kStep);
+    flight.guidance.update(flight.now += GuidedFlight::kStep, flight.state);
     TEST_ASSERT_FALSE(arrived());
   }
   TEST_ASSERT_TRUE(flight.reference().positionNed.x() == 10.0F);
@@ -136,7 +136,7 @@ void test_a_landing_asked_for_on_the_way_stops_first() {
   Vector3f before = flight.reference().velocityNed;
   for (int i = 0; i < 5000; ++i) {
     flight.now += GuidedFlight::kStep;
-    const Reference& r = flight.guidance.update(flight.now);
+    const Reference& r = flight.guidance.update(flight.now, flight.state);
     TEST_ASSERT_TRUE((r.velocityNed - before).norm() <= 2.0F * 0.002F * 1.05F);  // 2 m/s^2
     if (r.velocityNed.z() > 0.0F) TEST_ASSERT_TRUE(r.velocityNed.x() == 0.0F);
     before = r.velocityNed;

@@ -52,7 +52,7 @@ class LogBlocks {
   bool next(const std::vector<std::uint8_t>& bytes, std::size_t begin, Block& block) {
     constexpr std::size_t kEndMessage = 3 + 2 + 8 + 4 * 4;
     std::size_t place = begin == 0 ? 16 : begin;  // behind magic and start time
-    while (place + 3 <= bytes.size() && place - begin <= 4096) {
+    while (place + 3 <= bytes.size() && place - begin <= 8192) {
       const std::size_t size = std::size_t{3} + at<std::uint16_t>(bytes, place);
       const std::uint8_t type = bytes[place + 2];
       if (place + size > bytes.size()) return false;

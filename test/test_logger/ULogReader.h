@@ -39,6 +39,7 @@ struct ULogFile {
   std::string error;  ///< empty: the file is sound
   std::uint64_t start = 0;
   std::map<std::string, std::string> infos;
+  std::map<std::string, float> parameters;  ///< of the header
   std::map<std::string, Format> formats;
   std::map<std::uint16_t, Subscription> subscriptions;
   std::vector<Record> records;
@@ -76,12 +77,14 @@ struct ULogFile {
   static const char* typeOf(std::uint64_t) { return "uint64_t"; }
   static const char* typeOf(std::uint32_t) { return "uint32_t"; }
   static const char* typeOf(std::int32_t) { return "int32_t"; }
+  static const char* typeOf(std::uint16_t) { return "uint16_t"; }
   static const char* typeOf(std::uint8_t) { return "uint8_t"; }
   static const char* typeOf(float) { return "float"; }
 
   static std::size_t sizeOf(const std::string& type) {
     if (type == "uint64_t") return 8;
     if (type == "uint32_t" || type == "int32_t" || type == "float") return 4;
+    if (type == "uint16_t") return 2;
     if (type == "uint8_t") return 1;
     return 0;
   }
@@ -109,6 +112,9 @@ struct ULogFile {
           break;
         case 'I':
           info(at, body);
+          break;
+        case 'P':
+          parameter(at, body);
           break;
         case 'F':
           format(at, std::string(body.begin(), body.end()));
@@ -141,6 +147,14 @@ struct ULogFile {
       return fail(at, "type of info " + key);
     }
     infos[key.substr(space + 1)] = value;
+  }
+
+  void parameter(std::size_t at, const std::vector<std::uint8_t>& body) {
+    const std::string key(body.begin() + 1, body.begin() + 1 + body[0]);
+    if (key.substr(0, 6) != "float " || body.size() != 1U + body[0] + sizeof(float)) {
+      return fail(at, "parameter " + key);
+    }
+    std::memcpy(&parameters[key.substr(6)], &body[1U + body[0]], sizeof(float));
   }
 
   void format(std::size_t at, const std::string& text) {

@@ -111,9 +111,9 @@ void test_a_pulse_that_cannot_be_or_a_channel_that_is_missing_changes_nothing() 
     channels.pulse[5] = 2000;
     TEST_ASSERT_TRUE(map.update(channels).valid);
     const float roll = map.input().roll;
-    for (const std::uint16_t wrong : {0, 799, 2201, 65535}) {
+    for (const int wrong : {0, 799, 2201, 65535}) {
       RadioChannels broken = resting();
-      broken.pulse[channel] = wrong;
+      broken.pulse[channel] = static_cast<std::uint16_t>(wrong);
       TEST_ASSERT_FALSE(map.update(broken).valid);
       TEST_ASSERT_EQUAL_FLOAT(roll, map.input().roll);
       TEST_ASSERT_TRUE(map.input().kill);

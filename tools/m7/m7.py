@@ -78,11 +78,12 @@ def compile_flags() -> list[str]:
 
 
 def include_flags() -> list[str]:
-    """Where headers are: ours with -I; Eigen, not ours to warn about, as a system header."""
+    """Where headers are: ours with -I; Eigen and MAVLink, not ours to warn about, as system headers."""
     libraries = sorted(manifest.parent for manifest in (ROOT / "lib").glob("*/library.json"))
     ours = [HERE, *libraries, ROOT / "include"]
     eigen = Path(sysconfig.get_path("purelib"), "cmeel.prefix/include/eigen3")
-    return [*(f"-I{folder}" for folder in ours), "-isystem", str(eigen)]
+    system = ("-isystem", str(eigen), "-isystem", str(ROOT / "build/mavlink"))
+    return [*(f"-I{folder}" for folder in ours), *system]
 
 
 def build(

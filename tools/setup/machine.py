@@ -83,6 +83,7 @@ OPTIONAL_PACKAGES = {
     "qemu-system-arm": ["qemu-system-arm"],
     "clang++": ["clang"],
     "llvm-mca": ["llvm"],
+    "spin": ["spin"],
 }
 
 

@@ -44,6 +44,7 @@ def main() -> None:
             install_optional()
             return
         set_up_environment()
+        run(str(VENV / "bin" / "python"), str(TOOLS / "setup" / "mavlink.py"))
         if sys.argv[1:] != ["environment"]:
             build_core()
 

@@ -302,5 +302,16 @@ def diagrams(
         print(path)
 
 
+@app.command(epilog="Example: strix promela --out build/strix.pml")
+@says_what_is_wrong
+def promela(
+    out: Annotated[Path, typer.Option(help="The model's file")] = Path("strix.pml"),
+) -> None:
+    """Write the state machine as a model for Spin, with what is to be proven of it."""
+    from strix.promela import write_model
+
+    print(write_model(out))
+
+
 if __name__ == "__main__":
     app()

@@ -1,4 +1,5 @@
-"""`strix diagrams`: the pages docs/state-machine.md and docs/signals.md, made from the source.
+"""`strix diagrams`: the pages of docs/ that are made from the source: state machine, signals and
+parameters.
 
 The state machine comes from the compiled table. For the signals this file says what flows between
 the functions of FlightSoftware::controlTick; that these are all the functions which it calls, and
@@ -8,31 +9,15 @@ in its order, is read from its source.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from strix import _core
 from strix.errors import BadInput
+from strix.parameters import parameter_page, parameters
+from strix.state_page import MADE_BY, state_page
+from strix.state_table import rows
 
 SOURCE = Path(__file__).resolve().parents[2] / "lib/FlightSoftware/FlightSoftware.h"
-MADE_BY = "<!-- Made by `strix diagrams --out docs`: do not edit. -->"
-
-
-@dataclass(frozen=True)
-class Row:
-    """One row of the state machine's table."""
-
-    from_states: tuple[str, ...]
-    when: tuple[str, ...]  # all of these
-    unless: tuple[str, ...]  # none of these
-    to: str
-    said: str
-
-    @property
-    def condition(self) -> str:
-        return ", ".join([" and ".join(self.when), *(f"not {name}" for name in self.unless)])
 
 
 @dataclass(frozen=True)
@@ -55,15 +40,17 @@ class Signal:
 
 NODES = (
     Node("sensors", "readings since the last tick, in loop()", ()),
-    Node("pilot", "the pilot's switches", ()),
-    Node("power", "battery and ESCs", ("readPower",)),
-    Node("estimate", "where the aircraft is", ("navigation_.state",)),
+    Node("watchdog", "lets the processor go on", ("board_.feedWatchdog",)),
     Node(
-        "smooth",
-        "GPS's corrections given back slowly; none on the ground",
-        ("smoother_.advance", "motors_.armed", "smoother_.clear", "smoother_.apply"),
+        "estimate",
+        "where the aircraft is; GPS's corrections given back slowly, at once on the ground",
+        ("estimation_.estimate", "motors_.armed"),
     ),
+    Node("blind", "the model's word instead, without an IMU", ("flyBlind",)),
+    Node("power", "battery and ESCs", ("readPower",)),
+    Node("radio", "a frame of the receiver", ("readRadio",)),
     Node("states", "at most one transition; arms, disarms", ("updateStateMachine",)),
+    Node("pilot", "the sticks, and what helps them", ("guidance_.setPilot", "pilot_.input", "has")),
     Node("guidance", "where it should be", ("guidance_.update",)),
     Node(
         "gate",
@@ -75,41 +62,50 @@ NODES = (
         "what it takes",
         ("controller_.setGrounded", "controller_.updateControl", "controller_.getControl"),
     ),
-    Node("allocation", "what each motor gives of it", ("motors_.commandControl",)),
-    Node("escs", "four pulses", ("motors_.writeESC",)),
-    Node("achieved", "what the motors make of it", ("motors_.achieved", "motors_.meanRevolutions")),
-    Node("memory", "anti-windup, the motors' lag", ("controller_.setAchieved",)),
     Node(
-        "motors",
-        "what motors do to sensors",
-        ("motorState", "navigation_.setMotors"),
+        "allocation",
+        "what each motor gives of it; one alone in a motor test",
+        ("fsm_.state", "motors_.commandOne", "motors_.commandControl"),
     ),
-    Node("notch", "its centre", ("gyroFilter_.active", "gyroFilter_.setMotorSpeed")),
+    Node("escs", "four pulses", ("motors_.writeESC",)),
+    Node("achieved", "what the motors make of it", ("motors_.achieved",)),
+    Node("memory", "anti-windup, the motors' lag", ("controller_.setAchieved",)),
+    Node("motors", "what motors do to sensors", ("estimation_.setMotors", "motorState")),
     Node(
         "log",
         "records, and the tick's hash",
         (
             "tick",
-            "toRecords",
             "logger_.logGNC",
-            "logNavigation",
-            "controlLog_.run",
-            "toRecord",
-            "logger_.log",
-            "faultLog_.run",
-            "logFaults",
+            "toRecords",
+            "recorder_.logNavigation",
+            "navigation",
+            "recorder_.logControl",
+            "recorder_.logPilot",
+            "guidance_.effectiveMode",
+            "recorder_.logFaults",
+            "board_.countFaults",
+            "sensors",
+            "clipped",
+            "invalid",
+            "recorder_.watchSaving",
         ),
     ),
 )
 SIGNALS = (
+    Signal("watchdog", "escs", "without it no pulses"),
     Signal("sensors", "estimate", "Navigation's filter; rates by the gyro filter"),
-    Signal("pilot", "states", "arm, start, kill"),
-    Signal("estimate", "smooth", "VehicleState"),
-    Signal("smooth", "states", "VehicleState"),
-    Signal("smooth", "controller", "VehicleState"),
+    Signal("estimate", "blind", "VehicleState"),
+    Signal("blind", "states", "VehicleState"),
+    Signal("blind", "controller", "VehicleState"),
     Signal("power", "allocation", "V"),
+    Signal("power", "states", "V a cell"),
+    Signal("radio", "states", "switches, mode, or that it is lost"),
+    Signal("radio", "pilot", "sticks"),
     Signal("states", "guidance", "entered state"),
     Signal("states", "gate", "state"),
+    Signal("states", "pilot", "GPS, altimeter lost"),
+    Signal("pilot", "guidance", "PilotInput"),
     Signal("guidance", "gate", "idles"),
     Signal("guidance", "controller", "Reference"),
     Signal("gate", "controller", "grounded"),
@@ -119,18 +115,21 @@ SIGNALS = (
     Signal("allocation", "achieved", "squares of speeds"),
     Signal("achieved", "memory", "Wrench achieved"),
     Signal("memory", "controller", "next tick"),
-    Signal("achieved", "motors", "thrust"),
-    Signal("motors", "estimate", "stopped, disturbed, hover"),
-    Signal("achieved", "notch", "rev/s"),
-    Signal("notch", "estimate", "rates"),
+    Signal("memory", "blind", "its lagged wrench, next tick"),
+    Signal("achieved", "motors", "thrust, rev/s"),
+    Signal("motors", "estimate", "stopped, disturbed, hover; the notch's centre"),
     Signal("controller", "log", "reference, error, wrench"),
     Signal("escs", "log", "commands"),
 )
 
 
 def write_diagrams(out: Path) -> list[Path]:
-    """state-machine.md and signals.md in the folder `out`."""
-    pages = {"state-machine.md": state_page(rows()), "signals.md": signal_page(SOURCE)}
+    """state-machine.md, signals.md and parameters.md in the folder `out`."""
+    pages = {
+        "state-machine.md": state_page(rows()),
+        "signals.md": signal_page(SOURCE),
+        "parameters.md": parameter_page(parameters()),
+    }
     try:
         out.mkdir(parents=True, exist_ok=True)
         for name, text in pages.items():
@@ -140,87 +139,6 @@ def write_diagrams(out: Path) -> list[Path]:
             f"--out {out}: expected a folder that can be written, found: {error.strerror}"
         ) from None
     return [out / name for name in pages]
-
-
-def rows() -> list[Row]:
-    """The table that flies."""
-    return [
-        Row(
-            tuple(row["from_states"]),
-            tuple(row["when"]),
-            tuple(row["unless"]),
-            row["to"],
-            row["said"],
-        )
-        for row in _core.transitions()
-    ]
-
-
-def state_page(table: Sequence[Row]) -> str:
-    states: list[dict[str, Any]] = _core.states()
-    properties = [
-        f"| {s['name']} | {'may turn' if s['motors'] else 'off'} | "
-        f"{'on' if s['controller'] else 'off'} |"
-        for s in states
-    ]
-    listed = [
-        f"| {i} | {', '.join(row.from_states)} | {' and '.join(row.when)} | "
-        f"{', '.join(row.unless) or '-'} | {row.to} | {row.said} |"
-        for i, row in enumerate(table, 1)
-    ]
-    return "\n".join(
-        [
-            MADE_BY,
-            "# The state machine",
-            "",
-            "One table, `kTransitions` in `lib/FiniteStateMachine/FiniteStateMachine.h`, read from "
-            "top to bottom in every control tick; the first row that fits is taken. What the "
-            "conditions mean stands in `Conditions.h` beside them.",
-            "",
-            "An arrow from the frame is one from every state in it. Rows that only refuse (arming) "
-            "and stay are in the table alone.",
-            "",
-            "```mermaid",
-            *state_diagram(table),
-            "```",
-            "",
-            "| state | motors | controller |",
-            "| --- | --- | --- |",
-            *properties,
-            "",
-            "| row | from | when all of | unless any of | to | said |",
-            "| --- | --- | --- | --- | --- | --- |",
-            *listed,
-            "",
-        ]
-    )
-
-
-def state_diagram(table: Sequence[Row]) -> Iterator[str]:
-    """Mermaid's stateDiagram-v2. The states in flight, which share many rows, are in a frame."""
-    flight = min((frozenset(r.from_states) for r in table if len(r.from_states) > 2), key=len)
-    moves = [row for row in table if row.from_states != (row.to,)]
-    yield "stateDiagram-v2"
-    yield f"  [*] --> {_core.states()[0]['name']}"
-    yield '  state "in flight" as FLYING {'
-    # An arrow drawn in a frame pulls its ends into it.
-    for line in _arrows([r for r in moves if {*r.from_states, r.to} <= flight], flight):
-        yield "  " + line
-    yield "  }"
-    yield from _arrows([r for r in moves if not {*r.from_states, r.to} <= flight], flight)
-
-
-def _arrows(table: Iterable[Row], flight: frozenset[str]) -> Iterator[str]:
-    """Rows between the same two ends share an arrow; rows of all states in flight their frame's."""
-    found: dict[tuple[str, str], list[str]] = {}
-    for row in table:
-        sources = list(row.from_states)
-        if flight <= set(sources):
-            sources = ["FLYING", *(state for state in sources if state not in flight)]
-        for source in sources:
-            found.setdefault((source, row.to), []).append(row.condition)
-    for (source, target), conditions in found.items():
-        yield f"  {source} --> {target} : {'<br/>'.join(dict.fromkeys(conditions))}"
 
 
 def calls_of(source: Path, function: str) -> list[str]:

@@ -23,8 +23,11 @@ SPI_PINS = {"MOSI": 11, "MISO": 12, "clock": 13}
 # What the pins are called on the board's card.
 FUNCTIONS = dict(
     zip(
-        (7, 8, 10, 11, 12, 13, 16, 17, 18, 19, 24, 25),
-        ["RX2", "TX2", "CS", "MOSI", "MISO", "SCK", "SCL1", "SDA1", "SDA", "SCL", "SCL2", "SDA2"],
+        (0, 1, 7, 8, 10, 11, 12, 13, 16, 17, 18, 19, 24, 25, 34, 35),
+        (
+            *("RX1", "TX1", "RX2", "TX2", "CS", "MOSI", "MISO", "SCK"),
+            *("SCL1", "SDA1", "SDA", "SCL", "SCL2", "SDA2", "RX8", "TX8"),
+        ),
         strict=True,
     )
 )
@@ -57,6 +60,10 @@ class Pins:
     slow_scl: int
     gps_rx: int
     gps_tx: int
+    radio_rx: int
+    radio_tx: int
+    telemetry_rx: int
+    telemetry_tx: int
     arm: int
     kill: int
     start: int
@@ -93,6 +100,10 @@ def read_pins(board: Path) -> Pins:
         *numbers("kSlowBus", 2),
         *numbers("kGpsRx", 1),
         *numbers("kGpsTx", 1),
+        *numbers("kRadioRx", 1),
+        *numbers("kRadioTx", 1),
+        *numbers("kTelemetryRx", 1),
+        *numbers("kTelemetryTx", 1),
         *numbers("kArmSwitch", 1),
         *numbers("kKillSwitch", 1),
         *numbers("kStartSwitch", 1),
@@ -115,14 +126,16 @@ def check(pins: Pins, source: Path) -> None:
     imu, slow = (pins.imu_sda, pins.imu_scl), (pins.slow_sda, pins.slow_scl)
     require(imu in I2C_PAIRS, f"expected SDA and SCL of an I2C port in kImuBus, found {imu}")
     require(slow in I2C_PAIRS, f"expected SDA and SCL of an I2C port in kSlowBus, found {slow}")
-    gps = (pins.gps_rx, pins.gps_tx)
-    require(gps in SERIAL_PAIRS, f"expected RX and TX of a serial port for the GPS, found {gps}")
+    gps, radio = (pins.gps_rx, pins.gps_tx), (pins.radio_rx, pins.radio_tx)
+    telemetry = (pins.telemetry_rx, pins.telemetry_tx)
+    for what, port in (("GPS", gps), ("receiver", radio), ("telemetry", telemetry)):
+        require(port in SERIAL_PAIRS, f"expected a serial port's RX and TX: {what}, found {port}")
     for pin in pins.esc:
         require(pin in PWM_PINS, f"expected pins with PWM in kEsc, found {pin}")
     spi = (pins.spi_mosi, pins.spi_miso, pins.spi_clock)
     require(spi == tuple(SPI_PINS.values()), f"expected SPI on 11, 12, 13, found {spi}")
-    used = [*pins.esc, *imu, pins.imu_data_ready, *slow, *gps, pins.arm, pins.kill, pins.start]
-    used += [pins.spi_select, *spi]
+    used = [*pins.esc, *imu, pins.imu_data_ready, *slow, *gps, *radio, *telemetry]
+    used += [pins.arm, pins.kill, pins.start, pins.spi_select, *spi]
     twice = sorted({pin for pin in used if used.count(pin) > 1})
     require(not twice, f"expected one use a pin, found two of {twice}")
     rows = {*LEFT_ROW, *RIGHT_ROW}
@@ -173,7 +186,7 @@ def devices(pins: Pins, motors: list[Motor], variant: str) -> list[Device]:
     esc = [
         Device(
             f"ESC M{i + 1}",
-            (motor.place, f"turns {motor.turn}", "+ and - to the battery"),
+            (motor.place, f"turns {motor.turn}", "10 kOhm, signal to ground"),
             (
                 Wire("signal", "motor pulse", pins.esc[i]),
                 Wire("ground", "ground", to="GND"),
@@ -206,6 +219,27 @@ def devices(pins: Pins, motors: list[Motor], variant: str) -> list[Device]:
         ),
         pins.gps_rx in LEFT_ROW,
     )
+    receiver = Device(
+        "Radio receiver",
+        ("iBUS, SBUS or CRSF", "signal not above 3.3 V"),
+        (
+            Wire("+", "power", to="5 V of the BEC"),
+            Wire("GND", "ground", to="GND"),
+            Wire("signal", "serial", pins.radio_rx),
+        ),
+        pins.radio_rx in LEFT_ROW,
+    )
+    telemetry = Device(
+        "Telemetry radio",
+        ("57600 baud, 3.3 V signals", "aerial away from the GPS"),
+        (
+            Wire("+", "power", to="5 V of the BEC"),
+            Wire("GND", "ground", to="GND"),
+            Wire("TX", "serial", pins.telemetry_rx),
+            Wire("RX", "serial", pins.telemetry_tx),
+        ),
+        pins.telemetry_rx in LEFT_ROW,
+    )
     supply = Device(
         "5 V regulator (BEC)",
         ("from the battery, 6S", "cut VUSB from VIN first"),
@@ -237,7 +271,8 @@ def devices(pins: Pins, motors: list[Motor], variant: str) -> list[Device]:
             ("Altimeter, BMP390", ("address 0x77", "foam on its hole"), "SDI", "SCK"),
         )
     ]
-    around = [gps, imu(pins, variant), *esc, *switches, battery, supply, *slow]
+    around = [receiver, telemetry, gps, imu(pins, variant)]
+    around += [*esc, *switches, battery, supply, *slow]
     order: dict[int | str | None, int] = {
         pin: i for i, pin in enumerate(LEFT_ROW[1:], 1)
     }  # "GND" comes twice on the right

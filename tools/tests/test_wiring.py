@@ -63,6 +63,7 @@ def test_every_pin_of_the_firmware_has_a_wire_of_its_own(variant: str) -> None:
     imu = {"i2c": {pins.imu_sda, pins.imu_scl}, "spi": {10, 11, 12, 13}}[variant]
     switches = {pins.arm, pins.kill, pins.start}
     rest = {pins.imu_data_ready, pins.slow_sda, pins.slow_scl, pins.gps_rx, pins.gps_tx}
+    rest |= {pins.radio_rx, pins.telemetry_rx, pins.telemetry_tx}  # a receiver is not talked to
     assert drawn - {None, "VIN", "GND"} == {*pins.esc} | imu | switches | rest
 
 
@@ -127,7 +128,10 @@ def test_a_folder_without_the_headers_is_refused(tmp_path: Path) -> None:
     [
         ({"imu_sda": 19, "imu_scl": 18}, "kImuBus"),
         ({"slow_scl": 22}, "kSlowBus"),
-        ({"gps_rx": 8, "gps_tx": 7}, "serial port"),
+        ({"gps_rx": 8, "gps_tx": 7}, "GPS"),
+        ({"radio_tx": 2}, "receiver"),
+        ({"telemetry_rx": 35, "telemetry_tx": 34}, "telemetry"),
+        ({"radio_rx": 34, "radio_tx": 35}, r"two of \[34, 35\]"),
         ({"esc": (28, 37, 29, 32)}, "PWM"),
         ({"spi_miso": 9}, "SPI on 11, 12, 13"),
         ({"arm": 31}, r"two of \[31\]"),
@@ -155,6 +159,8 @@ def test_the_manuals_table_of_pins_is_the_firmwares() -> None:
         "IMU INT": str(pins.imu_data_ready),
         "magnetometer and altimeter SDA, SCL": f"{pins.slow_sda}, {pins.slow_scl}",
         "GPS TX, GPS RX": f"{pins.gps_rx}, {pins.gps_tx}",
+        "radio receiver": str(pins.radio_rx),
+        "telemetry TX, telemetry RX": f"{pins.telemetry_rx}, {pins.telemetry_tx}",
         "arm switch": str(pins.arm),
         "kill loop": str(pins.kill),
         "start switch": str(pins.start),

@@ -20,6 +20,7 @@ NUMPY_TYPES = {
     "float": "<f4",
     "int32_t": "<i4",
     "uint8_t": "u1",
+    "uint16_t": "<u2",
     "uint32_t": "<u4",
     "uint64_t": "<u8",
 }

@@ -53,6 +53,11 @@ class LogReader {
     const auto found = infos_.find(key);
     return found == infos_.end() ? std::string() : found->second;
   }
+  /// A parameter of the header; nullptr if there is none.
+  [[nodiscard]] const float* parameter(const std::string& name) const {
+    const auto found = parameters_.find(name);
+    return found == parameters_.end() ? nullptr : &found->second;
+  }
   [[nodiscard]] const std::string& path() const { return path_; }
 
   [[noreturn]] void refuse(const std::string& expected, const std::string& found) const {
@@ -73,6 +78,9 @@ class LogReader {
     } else if (type == 'I' && body[0] < body.size()) {  // key length, "char[4] key", value
       const std::string key = text.substr(1, body[0]);
       infos_[key.substr(key.find(' ') + 1)] = text.substr(1U + body[0]);
+    } else if (type == 'P' && body[0] + 1U + sizeof(float) == body.size()) {  // as 'I', a float
+      const std::string key = text.substr(1, body[0]);
+      std::memcpy(&parameters_[key.substr(key.find(' ') + 1)], &body[body[0] + 1U], sizeof(float));
     } else if (type == 'A' && body.size() > 3) {  // instance, id, name
       std::uint16_t id = 0;
       std::memcpy(&id, &body[1], sizeof id);
@@ -109,6 +117,7 @@ class LogReader {
   std::tuple<std::deque<Topics>...> records_;  // no spare room: read on a 16 MB machine too
   std::map<std::string, std::string> formats_;
   std::map<std::string, std::string> infos_;
+  std::map<std::string, float> parameters_;
   std::array<Taker, kLogStreamCount + 16> takers_{};
 };
 

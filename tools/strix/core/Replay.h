@@ -29,10 +29,11 @@ struct ReplayResult {
 
 using FlightLogReader =
     LogReader<topic::SensorCombined, topic::SensorMag, topic::SensorBaro, topic::VehicleGpsPosition,
-              topic::BatteryStatus, topic::EscStatus, topic::ManualControlSwitches,
-              topic::FlightConfig, topic::MissionLeg, topic::ControlTick, topic::LogStatus,
-              topic::VehicleAttitude, topic::VehicleAngularVelocity, topic::WrenchSetpoint,
-              topic::WrenchAchieved, topic::ActuatorOutputs>;
+              topic::BatteryStatus, topic::EscStatus, topic::ManualControlSwitches, topic::InputRc,
+              topic::VehicleCommand, topic::BootStatus, topic::FlightConfig, topic::MissionLeg,
+              topic::ControlTick, topic::LogStatus, topic::VehicleAttitude,
+              topic::VehicleAngularVelocity, topic::WrenchSetpoint, topic::WrenchAchieved,
+              topic::ActuatorOutputs>;
 
 /// The next record of a topic that has not been reached yet.
 template <class Topic>
@@ -91,6 +92,18 @@ class Cursor {
   return {r.arm_switch == 1, r.kill_switch == 1, r.start_switch == 1};
 }
 
+[[nodiscard]] inline RadioChannels asRead(const topic::InputRc& r) {
+  return {r.values, r.channel_count, r.rc_lost_frame != 0, r.rc_failsafe != 0};
+}
+[[nodiscard]] inline VehicleCommand asRead(const topic::VehicleCommand& r) {
+  return {static_cast<CommandKind>(r.kind),
+          static_cast<CommandSource>(r.source),
+          r.detail,
+          r.index,
+          r.time_us,
+          r.values};
+}
+
 /// The configuration that flew, which a flight log begins with.
 [[nodiscard]] inline const topic::FlightConfig& loggedConfig(const FlightLogReader& log) {
   const auto& records = log.records<topic::FlightConfig>();
@@ -138,6 +151,11 @@ class Cursor {
       flightConfig(airframe->vehicle, gains == nullptr ? *airframe->designs[chosen.design] : *gains,
                    mission, chosen.declination);
   config.design = chosen.design;
+  for (const ParameterInfo& row : kParameterTable) {
+    if (const float* value = log.parameter(std::string(row.name))) {
+      config.parameters.*row.member = *value;
+    }
+  }
   if (chosen.attitude_law != 0) config.control.reducedObserver = airframe->observer;
   const bool real = log.info("ver_hw") != SimulatedBoard<>::kName;
   if (real) useRealSensors(config.sensors, kCalibration);
@@ -174,12 +192,15 @@ class Replay {
     const std::uint64_t limit = firstGap();
     board_.setTime(static_cast<Micros>(chosen.timestamp));
     board_.setDevices(devicesOf(chosen));
+    for (const topic::BootStatus& boot : log_.records<topic::BootStatus>()) {
+      board_.setReset({boot.reset_cause, boot.motors_were_on != 0});
+    }
     result.begin = chosen.timestamp;
     result.logEnd = log_.records<topic::ControlTick>().back().timestamp;
     software_.setup();
     for (;;) {
-      const std::uint64_t time =
-          std::min({imu_.time(), mag_.time(), alt_.time(), gps_.time(), tick_.time()});
+      const std::uint64_t time = std::min(
+          {imu_.time(), mag_.time(), alt_.time(), gps_.time(), tick_.time(), command_.time()});
       if (time == UINT64_MAX) break;
       if (time >= limit) {
         result.gap = true;
@@ -187,6 +208,7 @@ class Replay {
       }
       give(time);
       pass(software_);
+      while (const auto* asked = command_.take(time)) (void)software_.command(asRead(*asked));
       result.end = time;
       const topic::ControlTick* logged = tick_.take(time);
       const bool ticked = software_.lastTick().timestamp == time;
@@ -232,6 +254,7 @@ class Replay {
           lost(logStreamId<topic::BatteryStatus, 0>()) ||
           lost(logStreamId<topic::EscStatus, 0>()) ||
           lost(logStreamId<topic::ManualControlSwitches, 0>()) ||
+          lost(logStreamId<topic::InputRc, 0>()) || lost(logStreamId<topic::VehicleCommand, 0>()) ||
           lost(logStreamId<topic::ControlTick, 0>())) {
         return sound;
       }
@@ -249,6 +272,7 @@ class Replay {
     if (const auto* r = gps_.take(time)) board_.put(asRead(*r));
     if (const auto* r = battery_.take(time)) board_.put(asRead(*r));
     if (const auto* r = escs_.take(time)) board_.put(asRead(*r));
+    if (const auto* r = radio_.take(time)) board_.put(asRead(*r));
     while (switches_.time() <= time) board_.setPilot(asRead(*switches_.take(switches_.time())));
   }
 
@@ -284,6 +308,8 @@ class Replay {
   Cursor<topic::BatteryStatus> battery_{log_};
   Cursor<topic::EscStatus> escs_{log_};
   Cursor<topic::ManualControlSwitches> switches_{log_};
+  Cursor<topic::InputRc> radio_{log_};
+  Cursor<topic::VehicleCommand> command_{log_};
   Cursor<topic::ControlTick> tick_{log_};
 };
 

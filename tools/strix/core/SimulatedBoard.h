@@ -3,6 +3,8 @@
 
 #include <Board.h>
 
+#include <algorithm>
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -35,11 +37,23 @@ class SimulatedBoard {
   [[nodiscard]] bool readGps(GpsRaw& out) { return take(gps_, out); }
   [[nodiscard]] bool readBattery(BatteryRaw& out) { return take(battery_, out); }
   [[nodiscard]] bool readEscStatus(EscRaw& out) { return take(escs_, out); }
-  [[nodiscard]] PilotSticks readSticks() const { return sticks_; }
   /// The simulator's mission comes with the configuration, a replay's from the log.
   [[nodiscard]] static std::string_view missionText() { return {}; }
   void countFaults(SensorFaultCounts& /*out*/) const {}  // nothing is in the way here
   [[nodiscard]] PilotSwitches readPilot() const { return pilot_; }
+  void beginRadio(RadioProtocol /*protocol*/) {}  // frames come ready-made
+  [[nodiscard]] bool readRadio(RadioChannels& out) { return take(radio_, out); }
+  void feedWatchdog() { fed_ = now_; }
+  [[nodiscard]] ResetStatus resetStatus() const { return reset_; }
+  void rememberMotors(bool on) { motorsOn_ = on; }
+  static constexpr std::size_t kStorageBytes = 4284;  // as a Teensy 4.1 has
+  void readStorage(std::size_t offset, std::uint8_t* data, std::size_t size) const {
+    std::copy_n(&storage_[offset], size, data);
+  }
+  bool writeStorage(std::size_t offset, const std::uint8_t* data, std::size_t size) {
+    std::copy_n(data, size, &storage_[offset]);
+    return true;
+  }
   void writeEsc(const EscCommands& commands) { esc_ = commands; }
   [[nodiscard]] Card& card() { return card_; }
 
@@ -53,10 +67,21 @@ class SimulatedBoard {
   void put(const GpsRaw& reading) { gps_ = reading; }
   void put(const BatteryRaw& reading) { battery_ = reading; }
   void put(const EscRaw& reading) { escs_ = reading; }
-  void setSticks(const PilotSticks& sticks) { sticks_ = sticks; }
+  void put(const RadioChannels& frame) { radio_ = frame; }
+  void setReset(const ResetStatus& reset) { reset_ = reset; }
+  [[nodiscard]] bool motorsOn() const { return motorsOn_; }  ///< as remembered for a restart
+  [[nodiscard]] Micros fedAt() const { return fed_; }        ///< the watchdog
+  using Storage = std::array<std::uint8_t, kStorageBytes>;
+  [[nodiscard]] Storage& storage() { return storage_; }  ///< 0xFF: never written
   [[nodiscard]] const EscCommands& esc() const { return esc_; }
 
  private:
+  [[nodiscard]] static Storage erased() {
+    Storage bytes;
+    bytes.fill(0xFF);
+    return bytes;
+  }
+
   template <class Reading>
   [[nodiscard]] static bool take(std::optional<Reading>& slot, Reading& out) {
     if (!slot) return false;
@@ -76,7 +101,11 @@ class SimulatedBoard {
   std::optional<GpsRaw> gps_;
   std::optional<BatteryRaw> battery_;
   std::optional<EscRaw> escs_;
-  PilotSticks sticks_;
+  std::optional<RadioChannels> radio_;
+  ResetStatus reset_;
+  Storage storage_ = erased();
+  Micros fed_ = 0;
+  bool motorsOn_ = false;
   EscCommands esc_{};
 };
 

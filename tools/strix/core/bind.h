@@ -9,6 +9,7 @@ void bindFilters(nanobind::module_& m);
 void bindFlight(nanobind::module_& m);
 void bindMissions(nanobind::module_& m);
 void bindMotors(nanobind::module_& m);
+void bindParameters(nanobind::module_& m);
 void bindReplay(nanobind::module_& m);
 void bindStates(nanobind::module_& m);
 void bindUgglanFlight(nanobind::module_& m);

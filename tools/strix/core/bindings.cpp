@@ -9,6 +9,7 @@ NB_MODULE(_core, m) {
   bindFlight(m);
   bindMissions(m);
   bindMotors(m);
+  bindParameters(m);
   bindReplay(m);
   bindStates(m);
   bindUgglanFlight(m);

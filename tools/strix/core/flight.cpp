@@ -1,17 +1,26 @@
 /// Python's view of a flight: the whole flight software on a board that Python feeds.
 #include "bind.h"
 
+#include <Console.h>
 #include <FlightConfig.h>
 #include <FlightSoftware.h>
+#include <GroundLink.h>
 #include <MissionText.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
+#include <optional>
 #include <stdexcept>
+#include <vector>
 
+#include "FolderLogs.h"
+#include "MemoryPort.h"
 #include "SimulatedBoard.h"
 #include "vehicles/Vehicles.h"
 
@@ -49,14 +58,25 @@ struct FlightOptions {
       : navigation(config.navigation),
         control(config.control),
         guidance(config.guidance),
+        parameters(config.parameters),
         gpsSmoothing(config.gpsSmoothing) {}
 
   strix::NavigationConfig navigation;
   strix::ControlConfig control;
   strix::GuidanceConfig guidance;
+  strix::Parameters parameters;
   float gpsSmoothing;
   std::size_t design = 0;        ///< of Airframe::designs
   bool reducedObserver = false;  ///< attitude by Ugglan's law
+  bool motorsWereOn = false;     ///< it is no power-up, but a restart in flight
+
+  void setParameter(const std::string& name, float value) {
+    const std::size_t index = strix::findParameter(name);
+    if (const char* wrong = strix::checkParameter(index, value, false)) {
+      throw std::invalid_argument("--param " + name + ": " + wrong);
+    }
+    parameters.*strix::kParameterTable[index].member = value;
+  }
 };
 
 strix::FlightSoftwareConfig configured(const std::string& vehicle, const strix::Mission& mission,
@@ -73,6 +93,9 @@ strix::FlightSoftwareConfig configured(const std::string& vehicle, const strix::
   config.control = options->control;
   config.guidance = options->guidance;
   config.gpsSmoothing = options->gpsSmoothing;
+  const float degrees = config.parameters.declination;
+  config.parameters = options->parameters;
+  config.parameters.declination = degrees;  // the surroundings'
   if (options->reducedObserver) {
     if (frame.observer == nullptr) {
       throw std::invalid_argument(vehicle + " has no gains of the reduced observer");
@@ -87,7 +110,8 @@ class Flight {
  public:
   Flight(const std::string& vehicle, const std::string& missionName, const std::string& missionText,
          float declination, const std::string& logPath, std::uint32_t bootId,
-         strix::Micros startTime, const FlightOptions* options)
+         strix::Micros startTime, const FlightOptions* options, bool console, bool telemetry,
+         nb::bytes storage)
       : missionName_(missionName),
         board_(logPath, bootId),
         software_(board_, configured(vehicle, readMission(missionName_, missionText), declination,
@@ -96,7 +120,39 @@ class Flight {
       throw std::invalid_argument(logPath + ": cannot be written: " + std::strerror(errno));
     }
     board_.setTime(startTime);
+    if (options != nullptr && options->motorsWereOn) {
+      board_.setReset({strix::reset::kWatchdog, true});
+    }
+    if (storage.size() != 0) {
+      if (storage.size() != board_.storage().size()) {
+        throw std::invalid_argument("storage: not as long as the board's");
+      }
+      std::memcpy(board_.storage().data(), storage.c_str(), storage.size());
+    }
     software_.setup();
+    if (telemetry) link_.emplace(software_, linkPort_, strix::PortTrust::Radio);
+    if (console) {
+      logs_.emplace(std::filesystem::path(logPath).parent_path());
+      console_.emplace(software_, consolePort_, *logs_);
+    }
+  }
+
+  /// What the board keeps without power, for another Flight.
+  [[nodiscard]] nb::bytes storage() {
+    return nb::bytes(board_.storage().data(), board_.storage().size());
+  }
+  void putTelemetry(const nb::bytes& heard) { linkPort_.put(heard.c_str(), heard.size()); }
+  [[nodiscard]] nb::bytes takeTelemetry() {
+    const std::string sent = linkPort_.take();
+    return nb::bytes(sent.data(), sent.size());
+  }
+  void putConsole(const nb::bytes& typed) { consolePort_.put(typed.c_str(), typed.size()); }
+  [[nodiscard]] nb::bytes takeConsole() {
+    const std::string said = consolePort_.take();
+    return nb::bytes(said.data(), said.size());
+  }
+  [[nodiscard]] bool rebootAsked() const {
+    return (console_ && console_->rebootAsked()) || (link_ && link_->rebootAsked());
   }
 
   void setSwitches(bool arm, bool start, bool kill) { board_.setPilot({arm, kill, start}); }
@@ -124,12 +180,41 @@ class Flight {
                              fix, satellites});
   }
 
+  /// A frame of a receiver: pulses in us.
+  void putRadio(const std::vector<std::uint16_t>& pulses, bool failsafe, bool frameLost) {
+    strix::RadioChannels frame;
+    frame.count = static_cast<std::uint8_t>(std::min(pulses.size(), frame.pulse.size()));
+    std::copy_n(pulses.begin(), frame.count, frame.pulse.begin());
+    frame.failsafe = failsafe;
+    frame.frameLost = frameLost;
+    board_.put(frame);
+  }
+
+  /// @return the refusal; empty: accepted
+  std::string command(strix::CommandKind kind, const std::array<float, 8>& values,
+                      std::uint16_t index, std::uint8_t detail, std::uint32_t time) {
+    const char* refusal =
+        software_.command({kind, strix::CommandSource::Link, detail, index, time, values});
+    return refusal == nullptr ? "" : refusal;
+  }
+
   /// One pass of the loop at `now`.
   /// @return the commands the ESCs have after it
   Array4 loop(strix::Micros now) {
     board_.setTime(now);
     software_.loop();
+    if (link_ && !software_.ticked()) link_->step(now);
+    if (console_ && !software_.ticked()) console_->step(now);
     return board_.esc();
+  }
+
+  /// What the flight software has said since this was asked last.
+  std::vector<std::string> texts() {
+    std::vector<std::string> said;
+    while (const strix::TextHistory::Text* text = software_.texts().next(textsRead_)) {
+      said.emplace_back(text->text());
+    }
+    return said;
   }
 
   /// Empties the log's rings onto the disk.
@@ -140,6 +225,7 @@ class Flight {
 
   [[nodiscard]] std::string stateName() const { return software_.stateMachine().name(); }
   [[nodiscard]] bool motorsOn() const { return software_.motors().armed(); }
+  [[nodiscard]] std::string refusal() const { return software_.status().refusal; }
   [[nodiscard]] Array4 attitude() const { return strix::toArray(state().attitude); }
   [[nodiscard]] Array3 position() const { return strix::toArray(state().positionNed); }
   [[nodiscard]] Array3 velocity() const { return strix::toArray(state().velocityNed); }
@@ -147,9 +233,16 @@ class Flight {
  private:
   [[nodiscard]] const strix::VehicleState& state() const { return software_.estimator().state(); }
 
+  std::uint32_t textsRead_ = 0;
   std::string missionName_;  // the mission keeps a pointer to it
   strix::SimulatedBoard<> board_;
-  strix::FlightSoftware<strix::SimulatedBoard<>> software_;
+  using Software = strix::FlightSoftware<strix::SimulatedBoard<>>;
+  Software software_;
+  strix::MemoryPort linkPort_;
+  std::optional<strix::GroundLink<Software, strix::MemoryPort>> link_;
+  strix::MemoryPort consolePort_;
+  std::optional<strix::FolderLogs> logs_;
+  std::optional<strix::Console<Software, strix::MemoryPort, strix::FolderLogs>> console_;
 };
 
 }  // namespace
@@ -180,8 +273,6 @@ void bindOptions(nb::module_& m) {
       .def_rw("integralThrust", &ControlConfig::integralThrust)
       .def_rw("integralYaw", &ControlConfig::integralYaw);
   nb::class_<TrajectoryLimits>(m, "TrajectoryLimits", "Of the way from place to place")
-      .def_rw("speedHorizontal", &TrajectoryLimits::speedHorizontal)
-      .def_rw("speedVertical", &TrajectoryLimits::speedVertical)
       .def_rw("acceleration", &TrajectoryLimits::acceleration)
       .def_rw("jerk", &TrajectoryLimits::jerk)
       .def_rw("yawRate", &TrajectoryLimits::yawRate)
@@ -192,7 +283,6 @@ void bindOptions(nb::module_& m) {
       .def_rw("arrivalRadius", &GuidanceConfig::arrivalRadius)
       .def_rw("arrivalSpeed", &GuidanceConfig::arrivalSpeed)
       .def_rw("arrivalYaw", &GuidanceConfig::arrivalYaw)
-      .def_rw("returnHeight", &GuidanceConfig::returnHeight)
       .def_rw("standThrust", &GuidanceConfig::standThrust);
   nb::class_<FlightOptions>(m, "FlightOptions",
                             "Another tuning of one flight; starts as the vehicle flies")
@@ -200,6 +290,9 @@ void bindOptions(nb::module_& m) {
       .def_rw("navigation", &FlightOptions::navigation)
       .def_rw("control", &FlightOptions::control)
       .def_rw("guidance", &FlightOptions::guidance)
+      .def("set_parameter", &FlightOptions::setParameter, "name"_a, "value"_a)
+      .def_rw("motors_were_on", &FlightOptions::motorsWereOn,
+              "It is no power-up: the processor restarted in flight")
       .def_rw("gps_smoothing", &FlightOptions::gpsSmoothing, "s")
       .def_rw("design", &FlightOptions::design,
               "Of the gains: 0 integral and lag, 1 no integral, 2 no lag, 3 neither")
@@ -208,13 +301,34 @@ void bindOptions(nb::module_& m) {
 }
 
 void bindFlight(nb::module_& m) {
+  using strix::CommandKind;
+  nb::enum_<CommandKind>(m, "CommandKind", "What may be asked of a flight: VehicleCommand.h")
+      .value("Arm", CommandKind::Arm)
+      .value("Disarm", CommandKind::Disarm)
+      .value("Kill", CommandKind::Kill)
+      .value("KillOff", CommandKind::KillOff)
+      .value("Start", CommandKind::Start)
+      .value("Land", CommandKind::Land)
+      .value("Return", CommandKind::Return)
+      .value("Hold", CommandKind::Hold)
+      .value("Resume", CommandKind::Resume)
+      .value("Setpoint", CommandKind::Setpoint)
+      .value("SetParameter", CommandKind::SetParameter)
+      .value("MissionClear", CommandKind::MissionClear)
+      .value("MissionLeg", CommandKind::MissionLeg)
+      .value("MissionDone", CommandKind::MissionDone)
+      .value("Calibrate", CommandKind::Calibrate)
+      .value("MotorTest", CommandKind::MotorTest)
+      .value("LinkAlive", CommandKind::LinkAlive);
   bindOptions(m);
   nb::class_<Flight>(m, "Flight",
                      "The flight software on a simulated board. Times are Micros (uint32, us).")
       .def(nb::init<const std::string&, const std::string&, const std::string&, float,
-                    const std::string&, std::uint32_t, strix::Micros, const FlightOptions*>(),
+                    const std::string&, std::uint32_t, strix::Micros, const FlightOptions*, bool,
+                    bool, nb::bytes>(),
            "vehicle"_a, "mission"_a, "mission_text"_a, "declination_rad"_a, "log_path"_a,
-           "boot_id"_a, "start_time_us"_a, "options"_a.none() = nb::none())
+           "boot_id"_a, "start_time_us"_a, "options"_a.none() = nb::none(), "console"_a = false,
+           "telemetry"_a = false, "storage"_a = nb::bytes("", 0))
       .def("set_switches", &Flight::setSwitches, "arm"_a, "start"_a, "kill"_a)
       .def("put_imu", &Flight::putImu, "sampled_us"_a, "accel_m_s2"_a, "gyro_rad_s"_a,
            "temperature_degc"_a)
@@ -225,11 +339,24 @@ void bindFlight(nb::module_& m) {
       .def("put_battery", &Flight::putBattery, "sampled_us"_a, "voltage_v"_a, "current_a"_a)
       .def("put_esc_status", &Flight::putEscStatus, "sampled_us"_a, "revolutions_per_s"_a,
            "voltage_v"_a, "temperature_degc"_a, "current_a"_a, "Of M1..M4; NaN where not told")
+      .def("put_radio", &Flight::putRadio, "pulses_us"_a, "failsafe"_a = false,
+           "frame_lost"_a = false, "A frame of the pilot's receiver")
+      .def("command", &Flight::command, "kind"_a, "values"_a = std::array<float, 8>{},
+           "index"_a = 0, "detail"_a = 0, "time_us"_a = 0,
+           "A command as telemetry gives it; returns why it was refused, or ''")
+      .def("texts", &Flight::texts, "What was said since this was asked last")
       .def("loop", &Flight::loop, "now_us"_a, "One pass; returns the ESC commands M1..M4 after it")
+      .def("put_telemetry", &Flight::putTelemetry, "heard"_a)
+      .def("take_telemetry", &Flight::takeTelemetry, "What it sends; made with telemetry=True")
+      .def("put_console", &Flight::putConsole, "typed"_a)
+      .def("take_console", &Flight::takeConsole, "What it says; made with console=True")
+      .def("storage", &Flight::storage, "What the board keeps without power")
+      .def_prop_ro("reboot_asked", &Flight::rebootAsked)
       .def("close", &Flight::close,
            "Writes the rest of the log; true when all of it is on the disk")
       .def_prop_ro("state_name", &Flight::stateName)
       .def_prop_ro("motors_on", &Flight::motorsOn)
+      .def_prop_ro("refusal", &Flight::refusal, "Of the first failing pre-arm check, or ''")
       .def_prop_ro("attitude", &Flight::attitude, "Estimate, [w x y z], body to NED")
       .def_prop_ro("position_ned_m", &Flight::position)
       .def_prop_ro("velocity_ned_m_s", &Flight::velocity);

@@ -2,6 +2,7 @@
 #include "bind.h"
 
 #include <FlightConfig.h>
+#include <Transmitter.h>
 #include <UgglanFlight.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/string.h>
@@ -47,7 +48,11 @@ class UgglanFlight {
 
   void setSwitches(bool arm, bool kill) { board_.setPilot({arm, kill, false}); }
   void setSticks(float roll, float pitch, float yaw, float throttle, bool valid) {
-    board_.setSticks({roll, pitch, yaw, throttle, valid});
+    sticks_.roll = roll;
+    sticks_.pitch = pitch;
+    sticks_.yaw = yaw;
+    sticks_.throttle = throttle;
+    sticks_.valid = valid;
   }
   void putImu(strix::Micros sampled, const Array3& accel, const Array3& gyro, float temperature) {
     board_.put(strix::ImuRaw{sampled, toVector(accel), toVector(gyro), temperature});
@@ -67,6 +72,7 @@ class UgglanFlight {
   /// @return the commands the ESCs have after it
   Array4 loop(strix::Micros now) {
     board_.setTime(now);
+    if (radioFrame_.run(now)) board_.put(strix::frameOf(sticks_));
     software_.loop();
     return board_.esc();
   }
@@ -85,6 +91,8 @@ class UgglanFlight {
   [[nodiscard]] Array4 attitude() const { return strix::toArray(software_.attitude()); }
 
  private:
+  strix::PilotInput sticks_;
+  strix::PeriodicTask radioFrame_{7000};  // us, as iBUS sends them
   strix::SimulatedBoard<> board_;
   strix::UgglanFlight<strix::SimulatedBoard<>> software_;
 };

@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from typing import BinaryIO, NamedTuple
 
-MAX_BLOCK = 4096
+MAX_BLOCK = 8192  # of the first, which has the header; of the others 4096
 SECTOR = 512  # what the card writes at a time
 
 _END = struct.Struct("<HcHQIIII")  # size, 'D', msg_id, then log_block's fields
@@ -22,9 +22,9 @@ _SUM_SIZE = 4
 _CHUNK = 1 << 20  # bytes in memory at a time
 
 # What may be a log_block, whatever its msg_id: a data message of its size whose length is that of a
-# block: more than the 29 bytes of its end, at most 4096. Other topics have its size.
+# block: more than the 29 bytes of its end, at most 8192. Other topics have its size.
 _LOOKS_LIKE_END = re.compile(
-    rb"\x1A\x00D.{18}(?:[\x1E-\xFF]\x00|.[\x01-\x0F]|\x00\x10)\x00\x00.{4}", re.DOTALL
+    rb"\x1A\x00D.{18}(?:[\x1E-\xFF]\x00|.[\x01-\x1F]|\x00\x20)\x00\x00.{4}", re.DOTALL
 )
 
 Progress = Callable[[int], None]  # bytes read so far

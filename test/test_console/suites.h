@@ -1,0 +1,7 @@
+/// The parts of this suite; test_console.cpp runs them.
+#pragma once
+
+void runLineTests();
+void runCommandTests();
+void runLogTests();
+void runHeapTests();
