@@ -6,11 +6,14 @@
 #include <string_view>
 
 #include "Checkout.h"
+#include "Console.h"
 #include "FlightConfig.h"
 #include "FlightSoftware.h"
+#include "GroundLink.h"
 #include "PowerUpChoice.h"
 
 #include "board/Faults.h"
+#include "board/SerialPort.h"
 #include "board/TeensyBoard.h"
 
 // The board's ESCs are driven by pulse width; for ESCs on I2C the board needs EscI2c in place of
@@ -28,13 +31,22 @@ namespace {
 using Flight = strix::FlightSoftware<strix::TeensyBoard>;
 
 strix::TeensyBoard board;
+strix::SerialPort radioModem(Serial8);
+strix::UsbPort usb;
+
+/// The flight software, and who speaks with it.
+struct Aircraft {
+  Flight flight{board, strix::flightConfig()};
+  strix::GroundLink<Flight, strix::SerialPort> link{flight, radioModem, strix::PortTrust::Radio};
+  strix::Console<Flight, strix::UsbPort, strix::TeensyBoard> console{flight, usb, board};
+};
 
 /// The log's rings want most of the 512 KB of RAM2, which leaves RAM1 to code and stack. The
 /// start-up code does not clear RAM2 as it clears RAM1, hence no plain static object there: its
 /// memory is cleared here, then it is built in place.
-alignas(Flight) DMAMEM std::byte memory[sizeof(Flight)];
+alignas(Aircraft) DMAMEM std::byte memory[sizeof(Aircraft)];
 
-Flight& flight = *new (std::memset(memory, 0, sizeof memory)) Flight(board, strix::flightConfig());
+Aircraft& aircraft = *new (std::memset(memory, 0, sizeof memory)) Aircraft;
 
 constexpr strix::CheckoutPins checkoutPins() {
   namespace pins = strix::pins;
@@ -82,7 +94,8 @@ std::size_t toTerminal(const char* text, std::size_t count) {
 void setup() {
   flying = !terminalAsksForCheckout();
   if (flying) {
-    flight.setup();
+    aircraft.flight.setup();
+    radioModem.begin(57'600);
   } else {
     if (CrashReport) Serial.print(CrashReport);  // of a fault before this start; told once
     checkout.begin();
@@ -91,7 +104,13 @@ void setup() {
 
 void loop() {
   if (flying) {
-    flight.loop();
+    aircraft.flight.loop();
+    if (!aircraft.flight.ticked()) {  // a control tick has its pass for itself
+      const strix::Micros now = board.micros();
+      aircraft.link.step(now);
+      aircraft.console.step(now);
+    }
+    if (aircraft.link.rebootAsked() || aircraft.console.rebootAsked()) strix::restart();
     return;
   }
   checkout.step([] { return Serial.read(); }, toTerminal);

@@ -174,12 +174,14 @@ class UgglanFlight {
       if (const char* reason = reasonToStop(now, off, kill)) {
         motors_.disarm();
         motors_.writeESC(board_);
+        board_.rememberMotors(false);
         logger_.logText(off ? ulog::LogLevel::Info : ulog::LogLevel::Error, time, reason);
       }
     } else if (edge) {
       const char* refusal = reasonNotToArm(now, kill);
       if (refusal == nullptr) {
         motors_.arm();
+        board_.rememberMotors(true);
         grounded_ = true;
         throttleLow_.reset(now);
       }
@@ -227,6 +229,7 @@ class UgglanFlight {
 
   /// Every 20 ms.
   void controlTick(Micros now, LogTime time) {
+    board_.feedWatchdog();
     const float dt = toSeconds(elapsed(now, lastTick_));
     lastTick_ = now;
     updateAttitude(now, dt);

@@ -83,7 +83,8 @@ class ControlBench {
   void pass() {
     now_ += kPeriod;
     if (now_ == kLegStart) guidance_.enter(strix::FlightState::Waypoint, now_, state_);
-    const m7::Counted guidance = counter.count([this] { reference_ = guidance_.update(now_, state_); });
+    const m7::Counted guidance =
+        counter.count([this] { reference_ = guidance_.update(now_, state_); });
     state_.positionNed = reference_.positionNed + noise_.vector(1.0F);
     state_.velocityNed = reference_.velocityNed + noise_.vector(0.5F);
     state_.attitude =

@@ -56,6 +56,22 @@ class BareBoard {
     out = anything<strix::SensorFaultCounts>();
   }
   [[nodiscard]] static strix::PilotSwitches readPilot() { return anything<strix::PilotSwitches>(); }
+  static void beginRadio(strix::RadioProtocol protocol) { takeAway(protocol); }
+  [[nodiscard]] static bool readRadio(strix::RadioChannels& out) { return read(out); }
+  static void feedWatchdog() { takeAway(0); }
+  [[nodiscard]] static strix::ResetStatus resetStatus() { return anything<strix::ResetStatus>(); }
+  static void rememberMotors(bool on) { takeAway(on); }
+  static constexpr std::size_t kStorageBytes = 4216;  // as the Teensy's
+  static void readStorage(std::size_t offset, std::uint8_t* data, std::size_t size) {
+    takeAway(offset);
+    for (std::size_t i = 0; i < size; ++i) data[i] = anything<std::uint8_t>();
+  }
+  [[nodiscard]] static bool writeStorage(std::size_t offset, const std::uint8_t* data,
+                                         std::size_t size) {
+    takeAway(offset);
+    for (std::size_t i = 0; i < size; ++i) takeAway(data[i]);
+    return anything<bool>();
+  }
   static void writeEsc(const strix::EscCommands& commands) { takeAway(commands); }
   [[nodiscard]] Card& card() { return card_; }
 
