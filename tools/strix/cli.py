@@ -11,6 +11,7 @@ import typer
 
 from strix.calibrate.cli import calibrate_app
 from strix.command import says_what_is_wrong
+from strix.errors import BadInput
 from strix.identify.cli import identify_app
 from strix.log import cli_view
 from strix.log.cli import log_app
@@ -54,6 +55,22 @@ def fly(
     ] = "lqr",
     heading: Annotated[float, typer.Option(help="Start heading, deg clockwise from north")] = 0.0,
     seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Of all noise and gusts")] = 1,
+    changes: Annotated[
+        list[str] | None, typer.Option("--param", help="NAME=VALUE, repeatable: docs/parameters.md")
+    ] = None,
+    telemetry: Annotated[
+        str | None,
+        typer.Option(help="A ground station flies it, as udp:127.0.0.1:14550, in real time"),
+    ] = None,
+    console: Annotated[
+        bool, typer.Option("--console", help="Somebody at a terminal flies it, in real time")
+    ] = False,
+    speed: Annotated[
+        float, typer.Option(min=0.0, help="Of these two, against real time; 0: none")
+    ] = 1.0,
+    duration: Annotated[
+        float | None, typer.Option("--for", min=1.0, help="Of these two, s; else until Ctrl-C")
+    ] = None,
     out: Annotated[
         Path, typer.Option(help="Folder for flight.ulg, report.html and summary.json")
     ] = Path("out"),
@@ -61,20 +78,33 @@ def fly(
 ) -> None:
     """Fly a mission in simulation: the flight software itself against a simulated aircraft.
 
-    Exits with 0 when the flight ended as its scenario has to, with 1 when it did not.
+    Exits with 0 when the flight ended as its scenario has to, with 1 when it did not. One that is
+    flown by telemetry or at a terminal ends as who flies it likes: 0.
     """
     from strix.fly import fly_and_report, fly_sticks_and_report, make_plan
+    from strix.ground import make_ground, read_parameters
     from strix.summary import print_summary
 
-    plan = make_plan(vehicle, mission, scenario, heading, seed, controller)
-    summary = (fly_sticks_and_report if controller == "sticks" else fly_and_report)(plan, out)
+    parameters = read_parameters(changes or [])
+    plan = make_plan(vehicle, mission, scenario, heading, seed, controller, parameters)
+    ground = make_ground(telemetry, console, speed, duration)
+    if ground is not None and controller == "sticks":
+        raise BadInput("--controller sticks: expected neither --telemetry nor --console")
+    if ground is not None and ground.terminal is not None:
+        print(f"console: {ground.terminal.path}", file=sys.stderr)
+    if controller == "sticks":
+        summary = fly_sticks_and_report(plan, out)
+    else:
+        summary = fly_and_report(plan, out, ground)
+    if ground is not None:
+        ground.close()
     if as_json:
         print(json.dumps(summary.to_dict()))
     else:
         print_summary(summary)
         print(summary.sentence())
         print(f"{out}/flight.ulg, {out}/report.html, {out}/summary.json")
-    if not summary.as_expected:
+    if ground is None and not summary.as_expected:
         raise typer.Exit(1)
 
 

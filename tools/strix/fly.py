@@ -15,6 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from strix.errors import BadInput
 from strix.flightlog import read_flight_log
+from strix.ground import Ground
 from strix.missions import find_mission
 from strix.report import write_report
 from strix.scenarios import Outcome, find_scenario, judge
@@ -67,6 +68,7 @@ def make_plan(
     heading_deg: float,
     seed: int,
     controller: str = Controller.LQR,
+    parameters: tuple[tuple[str, float], ...] = (),
 ) -> FlightPlan:
     """Checks what the user asked for; without a mission the scenario's own is flown."""
     if not math.isfinite(heading_deg):
@@ -82,6 +84,8 @@ def make_plan(
             f"--controller {controller}: expected --vehicle {STICKS_VEHICLE}, of whose "
             f"motors the law knows, found {name}"
         )
+    if controller == Controller.STICKS and parameters:
+        raise BadInput("--param: expected another --controller than sticks, which has none of them")
     if controller == Controller.STICKS and (mission is not None or not found.of_the_air):
         raise BadInput(
             "--controller sticks: expected no mission, and a scenario of the air alone such as "
@@ -89,12 +93,22 @@ def make_plan(
         )
     if controller == Controller.UGGLAN:
         found = replace(found, settings=(*found.settings, *_UGGLAN_LAW))
-    return FlightPlan(name, find_mission(mission or found.mission), found, heading_deg, seed)
+    return FlightPlan(
+        name,
+        find_mission(mission or found.mission),
+        found,
+        heading_deg,
+        seed,
+        parameters=parameters,
+    )
 
 
-def fly_and_report(plan: FlightPlan, out: Path) -> Flown:
-    """Flies the plan; leaves flight.ulg, report.html and summary.json in `out`."""
-    return _report(plan, out, lambda log_path, show: simulate(plan, log_path, show))
+def fly_and_report(plan: FlightPlan, out: Path, ground: Ground | None = None) -> Flown:
+    """Flies the plan; leaves flight.ulg, report.html and summary.json in `out`.
+
+    @param ground  flies it instead of the pilot, by telemetry or at a terminal
+    """
+    return _report(plan, out, lambda log_path, show: simulate(plan, log_path, show, ground=ground))
 
 
 def fly_sticks_and_report(plan: FlightPlan, out: Path) -> Flown:

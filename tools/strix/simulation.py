@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from strix import _core
+from strix.ground import Ground
 from strix.missions import Mission
 from strix.plant.earth import MAGNETIC_DECLINATION_RAD
 from strix.plant.frames import Matrix
@@ -46,6 +47,7 @@ class FlightPlan:
     seed: int
     sensors: SensorConstants = DEFAULT_CONSTANTS
     arm_at_s: float = ARM_AT_S
+    parameters: tuple[tuple[str, float], ...] = ()  # other than as configured
 
 
 class Pilot:
@@ -76,9 +78,17 @@ class Pilot:
 
 
 def fly(
-    plan: FlightPlan, log_path: Path, progress: Progress, give_up_s: float = GIVE_UP_S
+    plan: FlightPlan,
+    log_path: Path,
+    progress: Progress,
+    give_up_s: float = GIVE_UP_S,
+    ground: Ground | None = None,
 ) -> TruthTrack:
-    """Flies until the aircraft has landed, or gives up; the log is what the card would hold."""
+    """Flies until the aircraft has landed, or gives up; the log is what the card would hold.
+
+    With a ground nobody moves a switch: it flies by telemetry or console until the ground's end, or
+    until an interrupt, upon which the log is still written to its end.
+    """
     mission = plan.mission
     scenario = plan.scenario
     vehicle = scenario.variation.applied_to(plant_numbers(plan.vehicle))
@@ -88,6 +98,8 @@ def fly(
     )
     options = _core.FlightOptions(plan.vehicle)
     configure(options, scenario.settings)
+    for name, value in plan.parameters:
+        options.set_parameter(name, value)
     flight = _core.Flight(
         vehicle=plan.vehicle,
         mission=mission.name,
@@ -97,9 +109,30 @@ def fly(
         boot_id=plan.seed,
         start_time_us=plant.truth.time_us,
         options=options,
+        console=ground is not None and ground.terminal is not None,
+        telemetry=ground is not None and ground.link is not None,
     )
     pilot = Pilot(plan.arm_at_s)
     recorder = TruthRecorder()
+    try:
+        _fly_on(flight, plant, sensors, recorder, pilot, progress, give_up_s, ground)
+    except KeyboardInterrupt:
+        if ground is None:
+            raise
+    flight.close()
+    return recorder.track()
+
+
+def _fly_on(
+    flight: _core.Flight,
+    plant: Plant,
+    sensors: SensorSuite,
+    recorder: TruthRecorder,
+    pilot: Pilot,
+    progress: Progress,
+    give_up_s: float,
+    ground: Ground | None,
+) -> None:
     commands = flight.loop(plant.truth.time_us)
     step = 0
     while True:
@@ -109,17 +142,21 @@ def fly(
         _deliver(flight, sensors.sample(truth))
         commands = flight.loop(now_us)
         step += 1
-        if step % TRUTH_EVERY == 0:
-            recorder.add(truth)
-            time_s = now_us * 1e-6
-            state = flight.state_name
-            arm, start = pilot.switches(time_s, state, flight.motors_on)
-            flight.set_switches(arm=arm, start=start, kill=False)
-            progress(time_s, state)
-            if time_s > give_up_s or (pilot.done_at_s is not None and time_s >= pilot.done_at_s):
-                break
-    flight.close()
-    return recorder.track()
+        if step % TRUTH_EVERY != 0:
+            continue
+        recorder.add(truth)
+        time_s = now_us * 1e-6
+        state = flight.state_name
+        progress(time_s, state)
+        if ground is not None:
+            ground.exchange(flight, time_s)
+            if time_s >= ground.end_s or flight.reboot_asked:
+                return
+            continue
+        arm, start = pilot.switches(time_s, state, flight.motors_on)
+        flight.set_switches(arm=arm, start=start, kill=False)
+        if time_s > give_up_s or (pilot.done_at_s is not None and time_s >= pilot.done_at_s):
+            return
 
 
 def _deliver(flight: _core.Flight, samples: Samples) -> None:
