@@ -11,7 +11,6 @@ namespace strix {
 /// The airframe src/main.cpp flies.
 constexpr Airframe kFlown{kQuad5in, kQuad5inGains, kQuad5inDesigns};
 
-
 /// Age of an MTK3333's fix when its sentence has arrived; ArduPilot assumes the same of a receiver
 /// it does not know.
 constexpr Micros kGpsDelay = 100'000;

@@ -97,7 +97,10 @@ namespace strix {
           static_cast<std::uint8_t>(mission.end),
           config.design,
           static_cast<std::uint8_t>(reducedObserver ? 1 : 0),
-          static_cast<std::uint8_t>(answered)};
+          static_cast<std::uint8_t>(answered),
+          0,
+          0,
+          0};
 }
 
 [[nodiscard]] inline topic::MissionLeg toRecord(LogTime time, const Leg& leg) {

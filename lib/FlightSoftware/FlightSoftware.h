@@ -58,8 +58,7 @@ class FlightSoftware {
     reset_ = board_.resetStatus();
     board_.rememberMotors(false);
     const LoadReport stored = store_.load(config_.parameters, key_);
-    const bool damaged = stored.damaged || stored.refused > 0;
-    if (damaged) wrongConfig_ |= prearm::kParameters;
+    if (stored.damaged || stored.refused > 0) wrongConfig_ |= prearm::kParameters;
     if (reset_.motorsWereOn) wrongConfig_ |= prearm::kRestarted;
     applyParameters();
     board_.beginRadio(static_cast<RadioProtocol>(config_.parameters.radioProtocol));
@@ -76,21 +75,18 @@ class FlightSoftware {
     hazards_.start(now_);
     recorder_.start(now_);
     stateLog_.start(now_ + 8 * periodFromHz(Controller::kRateHz));
+    blindTask_.start(now_ + 9 * periodFromHz(Controller::kRateHz));
     logger_.begin(time_, {config_.vehicle.name,
                           Board::kName,
                           kVersion,
                           kGitCommit,
                           board_.bootId(),
                           {kParameterCount, &parameterForLog, this}});
-    logger_.log(topic::BootStatus{time_, reset_.causes, reset_.motorsWereOn,
-                                  static_cast<std::uint8_t>(damaged        ? 2
-                                                            : stored.empty ? 1
-                                                                           : 0)});
     if (reset_.motorsWereOn) {
       recorder_.say(ulog::LogLevel::Error, time_, "restarted while the motors were on: disarmed");
     }
     loadMission();
-    logMission();
+    logConfig(stored);
   }
 
   /// One pass. Nothing in it waits. Only a reading, a control tick or a command changes anything,
@@ -192,7 +188,7 @@ class FlightSoftware {
   void controlTick(Micros now, LogTime time) {
     board_.feedWatchdog();
     VehicleState estimate = estimation_.estimate(motors_.armed());
-    flyBlind(estimate);
+    flyBlind(now, estimate);
     readPower(time);
     readRadio(now, time);
     updateStateMachine(now, time, estimate);
@@ -224,12 +220,12 @@ class FlightSoftware {
   }
 
   /// What the model of the aircraft says, while no IMU does.
-  void flyBlind(VehicleState& estimate) {
+  void flyBlind(Micros now, VehicleState& estimate) {
     const std::array<float, kControlCount>& wrench = controller_.wrenchEstimate().now();
     if (fsm_.state() == FlightState::Blind) {
       estimate = estimation_.blind().update(wrench, kControlPeriod);
-    } else if (motors_.armed()) {
-      estimation_.blind().observe(wrench, estimate, kControlPeriod);
+    } else if (blindTask_.run(now) && motors_.armed()) {
+      estimation_.blind().observe(wrench, estimate, toSeconds(kBlindPeriod));
     }
   }
 
@@ -281,8 +277,13 @@ class FlightSoftware {
     guidance_.configure(config_.parameters);
   }
 
-  void logMission() {
-    logger_.log(toRecord(time_, config_, found_));
+  void logConfig(const LoadReport& stored) {
+    topic::FlightConfig record = toRecord(time_, config_, found_);
+    record.reset = static_cast<std::uint8_t>(reset_.causes);
+    record.in_flight = reset_.motorsWereOn ? 1 : 0;
+    record.stored = stored.empty ? 1 : 0;
+    if ((wrongConfig_ & prearm::kParameters) != 0) record.stored = 2;
+    logger_.log(record);
     const Mission& mission = config_.mission;
     for (std::size_t i = 0; i < mission.legCount && i < Mission::kMaxLegs; ++i) {
       logger_.log(toRecord(time_, mission.legs[i]));
@@ -414,7 +415,9 @@ class FlightSoftware {
   Persistence imuBack_{200'000};  ///< ours: 200 samples in a row
   PreArmSet wrongConfig_;         ///< what no flight can mend
   float cosArmTilt_ = 0.0F;
+  static constexpr Micros kBlindPeriod = periodFromHz(50);
   PeriodicTask stateLog_{periodFromHz(10)};
+  PeriodicTask blindTask_{kBlindPeriod};
   topic::ControlTick lastTick_;
   ConditionSet conditions_ = condition::kNone;  ///< of the last tick
   PreArmSet preArm_ = prearm::kNotCalibrated;

@@ -6,11 +6,11 @@
 #include "Parameters.h"
 #include "PilotInput.h"
 #include "ReferenceRamp.h"
+#include "SetpointFlight.h"
 #include "StandSequence.h"
 #include "States.h"
 #include "StickFlight.h"
 #include "Trajectory.h"
-#include "VehicleCommand.h"
 
 namespace strix {
 
@@ -27,14 +27,6 @@ struct GuidanceConfig {
   float returnHeight = 3.0F;             ///< m, ours: above people and fences on the way home
   float standThrust = 0.6F;  ///< of the weight, ours: near hover, and the stand holds it
 };
-
-/// ours: sink rate without an IMU, m/s. Higher up there is less time left of BLIND_TIME; an
-/// aircraft that comes down with 2.5 m/s may break a propeller.
-[[nodiscard]] inline float blindSink(float height) {
-  const float sink = 0.6F * height;
-  if (sink < 1.0F) return 1.0F;
-  return sink > 2.5F ? 2.5F : sink;
-}
 
 class Guidance {
  public:
@@ -53,44 +45,36 @@ class Guidance {
     config_.trajectory.speedVertical = p.speedVertical;
     trajectory_.setLimits(config_.trajectory);
     sticks_.configure(p);
+    setpoints_.configure(p);
   }
 
   /// What the pilot's sticks say now.
   /// @param position, height  whether the estimate has one to hold
-  /// @param onGround  with the throttle down: the motors idle
+  /// @param onGround  with the throttle down: the motors idle until it asks for lifting off
   void setPilot(const PilotInput& input, bool position, bool height, bool onGround) {
     input_ = input;
     mode_ = input.mode;
     if (mode_ == PilotMode::PositionHold && !position) mode_ = PilotMode::AltitudeHold;
-    if (mode_ == PilotMode::AltitudeHold && !height) mode_ = PilotMode::Attitude;
-    if (state_ == FlightState::Manual) idles_ = onGround;
-    if (waits_ && input.valid && input.start && !usesSticks(input.mode)) waits_ = false;
+    if (usesSticks(mode_) && !height) mode_ = PilotMode::Attitude;
+    if (state_ == FlightState::Manual) {
+      idles_ = (onGround || idles_) && !StickFlight::lifts(input, mode_);
+    }
+    const bool start = input.valid && input.start;
+    if (start && !started_) resume();
+    started_ = start;
   }
 
   /// Of the pilot's mode what can be flown now.
   [[nodiscard]] PilotMode effectiveMode() const { return mode_; }
 
-  /// CommandKind::Setpoint: a place within the fence, or a velocity.
-  void setSetpoint(const VehicleCommand& c, const Fence& fence) {
-    const auto given = [&c](unsigned first, unsigned count) {
-      const unsigned bits = ((1U << count) - 1U) << first;
-      return (c.index & bits) == bits;
-    };
-    setpoint_ = c;
-    toPlace_ = given(0, 3);
-    if (!toPlace_) return;
-    const float level = squareRoot(c.values[0] * c.values[0] + c.values[1] * c.values[1]);
-    const float most = fence.radius - kInsideFence;
-    const float share = level > most ? most / level : 1.0F;
-    const float highest = fence.height - kInsideFence;
-    float height = c.values[2] < highest ? c.values[2] : highest;
-    if (height < kInsideFence) height = kInsideFence;
-    place_ = {share * c.values[0], share * c.values[1], -height};
-    if (state_ == FlightState::Guided && source_ == Source::Trajectory) goToSetpoint();
-  }
+  /// CommandKind::Setpoint, to be flown in GUIDED.
+  void setSetpoint(const VehicleCommand& c, const Fence& fence) { setpoints_.take(c, fence); }
 
-  /// Ends a hold that somebody asked for.
-  void resume() { waits_ = false; }
+  /// Ends a hold that somebody asked for, or that has no mission begun.
+  void resume() {
+    if (state_ == FlightState::Hold && waits_) begun_ = true;
+    waits_ = false;
+  }
 
   /// The leg that is flown, from 1; 0: none yet.
   [[nodiscard]] std::uint8_t leg() const { return leg_; }
@@ -99,8 +83,12 @@ class Guidance {
   /// @param asked  somebody asked for it: a hold then lasts until he resumes
   void enter(FlightState state, Micros now, const VehicleState& estimate, bool asked = false) {
     const FlightState before = state_;
+    // A leg that was left on the way is flown again; a hold that no leg led to goes on only when
+    // somebody says so, but for the pilot's who hands a mission back that has begun.
+    const bool arrived = state == FlightState::Hold && !asked;
+    if (before == FlightState::Waypoint && !arrived && leg_ > 0) --leg_;
     waits_ = state == FlightState::Hold &&
-             (asked || before == FlightState::Manual || before == FlightState::Guided);
+             (asked || before == FlightState::Guided || (before == FlightState::Manual && !begun_));
     state_ = state;
     entered_ = now;
     idles_ = false;
@@ -108,6 +96,7 @@ class Guidance {
       case FlightState::Takeoff:
         source_ = Source::Ramp;
         leg_ = 0;
+        begun_ = true;
         holdTime_ = mission_.takeoffHoldTime;
         radius_ = config_.arrivalRadius;
         startYaw_ = yawOf(estimate.attitude);
@@ -121,7 +110,10 @@ class Guidance {
         if (leg_ < mission_.legCount) startLeg(mission_.legs[leg_++], now, estimate);
         break;
       case FlightState::Hold:
-        if (waits_) stop(now, estimate);
+        if (waits_ || before == FlightState::Manual) {
+          holdTime_ = 0;
+          stop(now, estimate);
+        }
         // From one attitude straight to the next; after the last one the aircraft is stopped.
         if (source_ == Source::Attitude && !nextIsAttitude()) stop(now, estimate);
         break;
@@ -133,30 +125,22 @@ class Guidance {
         if (trajectory_.arrived()) startDescent(now);
         break;
       case FlightState::Manual:
-        if (before == FlightState::Armed) {  // no mission has begun
+        if (before == FlightState::Armed) {
           leg_ = 0;
+          begun_ = false;
           startYaw_ = yawOf(estimate.attitude);
         }
         source_ = Source::Sticks;
         sticks_.start(now, estimate);
         break;
       case FlightState::Guided:
-        if (toPlace_) {
-          takeOver(now, estimate);
-          trajectory_.setSpeed(0.0F);
-          goToSetpoint();
-        } else {
-          source_ = Source::Sticks;
-          sticks_.start(now, estimate);
-        }
+        takeOver(now, estimate);
+        setpoints_.start(now, trajectory_.reference());
+        source_ = Source::Setpoint;
         break;
       case FlightState::Blind:
-        source_ = Source::Ramp;
-        ramp_.setVerticalSpeed(blindSink(-estimate.positionNed.z()));
-        ramp_.reset(now, estimate);
-        target_ = estimate.positionNed;
-        target_.z() = config_.landingDepth;
-        ramp_.setTarget(target_, yawOf(estimate.attitude));
+        setpoints_.start(now, motionOf(estimate));
+        source_ = Source::Setpoint;
         break;
       case FlightState::AttitudeStand:
         source_ = Source::Stand;
@@ -172,8 +156,11 @@ class Guidance {
   const Reference& update(Micros now, const VehicleState& estimate) {
     switch (source_) {
       case Source::Sticks:
-        updateSticks(now, estimate);
-        break;
+        if (idles_) sticks_.start(now, estimate);
+        return sticks_.fly(now, input_, mode_, estimate);
+      case Source::Setpoint:
+        return state_ == FlightState::Blind ? setpoints_.descend(now, estimate)
+                                            : setpoints_.fly(now, estimate);
       case Source::Ramp:
         if (state_ == FlightState::Land &&
             -ramp_.reference().positionNed.z() < config_.landingSlowHeight) {
@@ -220,13 +207,20 @@ class Guidance {
   [[nodiscard]] const Reference& reference() const {
     if (source_ == Source::Ramp) return ramp_.reference();
     if (source_ == Source::Sticks) return sticks_.reference();
+    if (source_ == Source::Setpoint) return setpoints_.reference();
     return source_ == Source::Trajectory ? trajectory_.reference() : tilted_;
   }
 
  private:
-  enum class Source : std::uint8_t { Ramp, Trajectory, Attitude, Stand, Sticks };
+  enum class Source : std::uint8_t { Ramp, Trajectory, Attitude, Stand, Sticks, Setpoint };
 
-  static constexpr float kInsideFence = 1.0F;  ///< m, ours: of positions by telemetry
+  [[nodiscard]] static Reference motionOf(const VehicleState& estimate) {
+    Reference motion;
+    motion.positionNed = estimate.positionNed;
+    motion.velocityNed = estimate.velocityNed;
+    motion.yaw = yawOf(estimate.attitude);
+    return motion;
+  }
 
   void setTarget(const Vector3f& positionNed, float yaw) {
     target_ = positionNed;
@@ -238,13 +232,7 @@ class Guidance {
   /// where the reference had no place.
   void takeOver(Micros now, const VehicleState& estimate) {
     if (source_ != Source::Trajectory) {
-      Reference from = reference();
-      if (source_ == Source::Sticks || source_ == Source::Stand) {
-        from = {};
-        from.positionNed = estimate.positionNed;
-        from.velocityNed = estimate.velocityNed;
-        from.yaw = yawOf(estimate.attitude);
-      }
+      Reference from = source_ == Source::Stand ? motionOf(estimate) : reference();
       if (source_ == Source::Attitude) {
         from.positionNed.head<2>() = estimate.positionNed.head<2>();
         from.velocityNed.head<2>() = estimate.velocityNed.head<2>();
@@ -318,22 +306,6 @@ class Guidance {
     ramp_.setTarget(target_, targetYaw_);
   }
 
-  void goToSetpoint() {
-    const bool turns = (setpoint_.index >> 3U & 1U) != 0;
-    setTarget(place_, turns ? setpoint_.values[3] : targetYaw_);
-  }
-
-  void updateSticks(Micros now, const VehicleState& estimate) {
-    if (state_ == FlightState::Guided) {
-      if (toPlace_) return enter(state_, now, estimate);  // from velocities to places
-      const std::array<float, 8>& v = setpoint_.values;
-      sticks_.flyVelocity(now, {v[4], v[5], -v[6]}, v[7], estimate);
-      return;
-    }
-    if (idles_) sticks_.start(now, estimate);
-    sticks_.fly(now, input_, mode_, estimate);
-  }
-
   /// At the height that the last trajectory gives.
   void updateAttitude(Micros now) {
     const Reference& level = trajectory_.update(now);
@@ -376,6 +348,7 @@ class Guidance {
         return trajectory_.arrived() && near(estimate);
       case Source::Stand:
       case Source::Sticks:
+      case Source::Setpoint:
         break;
     }
     return false;
@@ -397,13 +370,13 @@ class Guidance {
   ReferenceRamp ramp_;
   Trajectory trajectory_;
   StickFlight sticks_;
+  SetpointFlight setpoints_;
   PilotInput input_;
   PilotMode mode_ = PilotMode::Mission;
-  VehicleCommand setpoint_;            ///< the last one
-  Vector3f place_ = Vector3f::Zero();  ///< m, NED, where it asks for one
-  bool toPlace_ = false;
-  bool waits_ = false;  ///< in HOLD until somebody resumes
-  Reference tilted_;    ///< that of an attitude leg or of the stand
+  bool started_ = false;  ///< his start switch was on
+  bool begun_ = false;    ///< the mission: handed back, it goes on
+  bool waits_ = false;    ///< in HOLD until somebody resumes
+  Reference tilted_;      ///< that of an attitude leg or of the stand
   Source source_ = Source::Ramp;
   FlightState state_ = FlightState::Boot;
   Vector3f target_ = Vector3f::Zero();

@@ -1,104 +1,111 @@
-/// The reference that a pilot's sticks, or velocities by telemetry, ask for.
+/// The reference that a pilot's sticks ask for, in each of his modes.
 #pragma once
 
 #include "Mathpk.h"
 #include "Parameters.h"
 #include "PilotInput.h"
-#include "VehicleState.h"
+#include "VelocityPath.h"
 
 namespace strix {
 
-/// Smooth in every mode: velocity follows what is asked with bounded acceleration and jerk, and a
-/// change of mode goes on from the motion that is there. The heading turns by the yaw stick.
+/// A change of mode goes on from the motion that is there. docs/pilot-modes.md has the modes.
 class StickFlight {
  public:
-  /// @param weight  N: the throttle's middle in attitude mode
+  /// @param weight  N: what the throttle's middle gives in attitude mode
   explicit StickFlight(float weight) : weight_(weight) {}
 
   void configure(const Parameters& p) {
     tilt_ = p.stickTilt * kDegToRad;
-    yawRate_ = p.stickYaw * kDegToRad;
-    speed_ = p.stickSpeed;
-    climb_ = p.stickClimb;
+    bounds_ = {p.fenceRadius - kInsideFence, p.fenceHeight - kInsideFence, {}};
+    bounds_.limits.speedHorizontal = p.stickSpeed;
+    bounds_.limits.speedVertical = p.stickClimb;
+    bounds_.limits.yawRate = p.stickYaw * kDegToRad;
   }
 
   /// Goes on from the aircraft's own motion.
   void start(Micros now, const VehicleState& estimate) {
     last_ = now;
-    reference_ = {};
-    reference_.positionNed = estimate.positionNed;
-    reference_.velocityNed = estimate.velocityNed;
-    reference_.yaw = yawOf(estimate.attitude);
+    Reference from;
+    from.positionNed = estimate.positionNed;
+    from.velocityNed = estimate.velocityNed;
+    from.yaw = yawOf(estimate.attitude);
+    path_.start(from);
+    path_.followLevel(estimate, bounds_.limits.acceleration);
+    reference_ = path_.reference();
   }
 
   /// @param mode  Attitude, AltitudeHold or PositionHold
-  const Reference& fly(Micros now, const PilotInput& sticks, PilotMode mode,
+  const Reference& fly(Micros now, const PilotInput& input, PilotMode mode,
                        const VehicleState& estimate) {
     const float dt = step(now);
+    const Sticks sticks = sound(input);
     const float heading = yawOf(estimate.attitude);
-    turn(within(sticks.yaw) * yawRate_, heading, dt);
+    path_.turn(sticks.yaw * bounds_.limits.yawRate, heading, bounds_.limits, kHeadingLead, dt);
     if (mode == PilotMode::Attitude) {
-      reference_.mode = ReferenceMode::Attitude;
-      reference_.thrust = 2.0F * weight_ * upTo(sticks.throttle, 1.0F);
-      follow(estimate);  // another mode begins where the aircraft is
+      path_.followLevel(estimate, bounds_.limits.acceleration);
+      path_.followHeight(estimate);
     } else {
-      const bool holds = mode == PilotMode::PositionHold;
-      reference_.mode = holds ? ReferenceMode::Position : ReferenceMode::AttitudeHeight;
-      Vector3f wanted{0.0F, 0.0F, -climb_ * climbStick(sticks.throttle)};
-      if (holds) {
-        const SinCos s = sinCos(heading);
-        const float forward = -speed_ * within(sticks.pitch);
-        const float right = speed_ * within(sticks.roll);
-        wanted.x() = s.cos * forward - s.sin * right;
-        wanted.y() = s.sin * forward + s.cos * right;
-      }
-      move(wanted, estimate, holds, dt);
+      const bool places = mode == PilotMode::PositionHold;
+      if (!places) path_.followLevel(estimate, bounds_.limits.acceleration);
+      path_.move(wantedVelocity(sticks, heading), bounds_, places, dt);
+      path_.boundLead(estimate, kLead);
     }
-    if (mode != PilotMode::PositionHold) {
-      reference_.attitude = eulerToQuaternion(
-          {tilt_ * within(sticks.roll), tilt_ * within(sticks.pitch), reference_.yaw});
-    }
+    reference_ = path_.reference();
+    if (mode == PilotMode::PositionHold) return reference_;
+    reference_.mode =
+        mode == PilotMode::Attitude ? ReferenceMode::Attitude : ReferenceMode::AttitudeHeight;
+    reference_.attitude =
+        eulerToQuaternion({tilt_ * sticks.level.y(), -tilt_ * sticks.level.x(), reference_.yaw});
+    reference_.thrust = 2.0F * weight_ * sticks.throttle;
     return reference_;
   }
 
-  /// @param velocityNed  m/s    @param yawRate  rad/s
-  const Reference& flyVelocity(Micros now, const Vector3f& velocityNed, float yawRate,
-                               const VehicleState& estimate) {
-    const float dt = step(now);
-    turn(upTo(yawRate, yawRate_), yawOf(estimate.attitude), dt);
-    reference_.mode = ReferenceMode::Position;
-    Vector3f wanted = velocityNed;
-    const float level = squareRoot(wanted.x() * wanted.x() + wanted.y() * wanted.y());
-    if (level > speed_) wanted.head<2>() *= speed_ / level;
-    wanted.z() = upTo(wanted.z(), climb_);
-    move(wanted, estimate, true, dt);
-    return reference_;
+  /// The throttle asks for more than the ground can carry: taking off begins here.
+  [[nodiscard]] static bool lifts(const PilotInput& input, PilotMode mode) {
+    const Sticks sticks = sound(input);
+    return mode == PilotMode::Attitude ? sticks.throttle > kLift : climb(sticks.throttle) > 0.0F;
   }
 
   [[nodiscard]] const Reference& reference() const { return reference_; }
 
  private:
-  static constexpr float kAcceleration = 2.5F;  ///< m/s^2, ours: 14 deg of tilt
-  static constexpr float kJerk = 10.0F;         ///< m/s^3, ours
-  static constexpr float kResponse = 0.4F;      ///< s, of velocity to what is asked
-  static constexpr float kLead = 1.5F;          ///< m that the reference runs ahead of the aircraft
-  static constexpr float kHeadingLead = 1.0F;   ///< rad, as Ugglan's (StickMapping.h)
-  static constexpr float kMiddle = 0.1F;        ///< of the throttle's way, either side: no climb
+  static constexpr float kHeadingLead = 1.0F;  ///< rad, as Ugglan's (StickMapping.h)
+  static constexpr float kLead = 1.5F;         ///< m, ours: within what the controller acts on
+  static constexpr float kInsideFence = 1.0F;  ///< m, ours: what an estimate wanders
+  static constexpr float kMiddle =
+      0.2F;                              ///< of the half way, either side: PX4's MPC_HOLD_DZ is 0.1
+  static constexpr float kLift = 0.15F;  ///< of the way, ours: more than a stick's slack
 
-  [[nodiscard]] static float upTo(float value, float most) {
-    if (!isFinite(value)) return 0.0F;
-    if (value > most) return most;
-    return value < -most ? -most : value;
+  struct Sticks {
+    Vector2f level = Vector2f::Zero();  ///< forward and right, together within the unit circle
+    float yaw = 0.0F;                   ///< right
+    float throttle = 0.5F;              ///< 0 to 1
+  };
+
+  /// What is no number, or of no transmitter, is the middle. In a corner the sticks ask for no more
+  /// than at a side: 45 deg of roll and of pitch would be 60 deg of tilt.
+  [[nodiscard]] static Sticks sound(const PilotInput& input) {
+    Sticks s;
+    if (!input.valid) return s;
+    const auto within = [](float stick) { return isFinite(stick) ? clamped(stick, 1.0F) : 0.0F; };
+    s.level = {-within(input.pitch), within(input.roll)};  // pulled back is nose up
+    s.level *= shortening(s.level, 1.0F);
+    s.yaw = within(input.yaw);
+    if (isFinite(input.throttle)) s.throttle = 0.5F + clamped(input.throttle - 0.5F, 0.5F);
+    return s;
   }
-  [[nodiscard]] static float within(float stick) { return upTo(stick, 1.0F); }
 
-  /// -1 to 1 of a throttle of 0 to 1. One that is no number neither climbs nor sinks.
-  [[nodiscard]] static float climbStick(float throttle) {
-    const float stick = isFinite(throttle) ? within(2.0F * throttle - 1.0F) : 0.0F;
-    const float size = stick < 0.0F ? -stick : stick;
-    if (size <= 2.0F * kMiddle) return 0.0F;
-    const float rest = (size - 2.0F * kMiddle) / (1.0F - 2.0F * kMiddle);
-    return stick < 0.0F ? -rest : rest;
+  /// -1 to 1 of a throttle of 0 to 1, with a middle that holds.
+  [[nodiscard]] static float climb(float throttle) {
+    const float stick = 2.0F * throttle - 1.0F;
+    if (stick > kMiddle) return (stick - kMiddle) / (1.0F - kMiddle);
+    return stick < -kMiddle ? (stick + kMiddle) / (1.0F - kMiddle) : 0.0F;
+  }
+
+  /// m/s, NED: the sticks are those of somebody who looks where the nose does.
+  [[nodiscard]] Vector3f wantedVelocity(const Sticks& sticks, float heading) const {
+    const Vector2f level = bounds_.limits.speedHorizontal * turned(sinCos(heading), sticks.level);
+    return {level.x(), level.y(), -bounds_.limits.speedVertical * climb(sticks.throttle)};
   }
 
   /// s since the last call; a gap of more than 0.1 s counts as 0.1 s.
@@ -108,46 +115,10 @@ class StickFlight {
     return toSeconds(gap < 100'000 ? gap : 100'000);
   }
 
-  /// With the stick let go the aircraft does not go on turning: the lead is bounded.
-  void turn(float rate, float heading, float dt) {
-    const float lead = upTo(wrapAngle(reference_.yaw + rate * dt - heading), kHeadingLead);
-    reference_.yaw = wrapAngle(heading + lead);
-    reference_.yawRate = rate;
-  }
-
-  void follow(const VehicleState& estimate) {
-    reference_.positionNed = estimate.positionNed;
-    reference_.velocityNed = estimate.velocityNed;
-    reference_.accelerationNed.setZero();
-    reference_.jerkNed.setZero();
-  }
-
-  /// One step of velocity and place towards the wanted velocity.
-  /// @param level  north and east too; else they follow the aircraft
-  void move(const Vector3f& wanted, const VehicleState& estimate, bool level, float dt) {
-    Reference& r = reference_;
-    if (!level) {
-      r.positionNed.head<2>() = estimate.positionNed.head<2>();
-      r.velocityNed.head<2>() = estimate.velocityNed.head<2>();
-    }
-    for (Eigen::Index i = level ? 0 : 2; i < 3; ++i) {
-      const float asked = upTo((wanted(i) - r.velocityNed(i)) / kResponse, kAcceleration);
-      const float before = r.accelerationNed(i);
-      const float change = upTo(asked - before, kJerk * dt);
-      r.accelerationNed(i) = before + change;
-      r.velocityNed(i) += r.accelerationNed(i) * dt;
-      const float ahead =
-          upTo(r.positionNed(i) + r.velocityNed(i) * dt - estimate.positionNed(i), kLead);
-      r.positionNed(i) = estimate.positionNed(i) + ahead;
-    }
-    if (!level) r.accelerationNed.head<2>().setZero();
-  }
-
-  float weight_;
-  float tilt_ = 0.0F;     ///< rad at full stick
-  float yawRate_ = 0.0F;  ///< rad/s
-  float speed_ = 0.0F;    ///< m/s
-  float climb_ = 0.0F;    ///< m/s
+  float weight_;       ///< N
+  float tilt_ = 0.0F;  ///< rad at full stick
+  PathBounds bounds_;
+  VelocityPath path_;
   Reference reference_;
   Micros last_ = 0;
 };

@@ -71,7 +71,6 @@ using LogStreams = std::tuple<
     LogStream<topic::ManualControlSwitches,  0,       1,         1,     16000>,  // and on change
     LogStream<topic::InputRc,                0,     143,         1,      2000>,  // iBUS: each 7 ms
     LogStream<topic::VehicleCommand,         0,      20,         1,      2000>,
-    LogStream<topic::BootStatus,             0,       1,         1,      8000>,  // once
     LogStream<topic::FlightConfig,           0,       1,         1,      8000>,  // once
     LogStream<topic::MissionLeg,             0,       1,         1,     32000>,  // 32 at most, once
     LogStream<topic::VehicleAttitude,        0,     500,         1,      2000>,

@@ -25,8 +25,8 @@ enum class CommandKind : std::uint8_t {
                  ///< radius m; speed m/s; roll, pitch rad; time: hold
   MissionDone,   ///< index: legs; values[0]: take-off height m; detail: MissionEnd; time: the hold
   Calibrate,     ///< stand still and begin as after power-up
-  MotorTest,     ///< index: motor from 0; values[0]: 0 to 1 of the ESC's range; time: so long, 0: end
-  LinkAlive,     ///< a ground station that commands is heard: its heartbeat
+  MotorTest,  ///< index: motor from 0; values[0]: 0 to 1 of the ESC's range; time: so long, 0: end
+  LinkAlive,  ///< a ground station that commands is heard: its heartbeat
 };
 
 enum class CommandSource : std::uint8_t { Link, Console };

@@ -118,8 +118,8 @@ class Motors {
     stop();
     if (!armed_ || motor >= kMotorCount || !(share > 0.0F)) return;
     const float range = vehicle_.commandMax - vehicle_.commandOff;
-    commands_[motor] = clamp(vehicle_.commandOff + share * range, vehicle_.commandOff,
-                             vehicle_.commandFlightMax);
+    commands_[motor] =
+        clamp(vehicle_.commandOff + share * range, vehicle_.commandOff, vehicle_.commandFlightMax);
   }
 
   /// Squared speeds for a finite wrench: exact when they can be within the limits; otherwise roll

@@ -137,11 +137,11 @@ const Refusal kRefusals[] = {
     {prearm::kKillSwitch, kAsUsual, kAsUsual, [](FakeFlight& f) { f.board.pilot.kill = true; }},
     {prearm::kStartSwitch, kAsUsual, kAsUsual, [](FakeFlight& f) { f.board.pilot.start = true; }},
     {prearm::kLog, kAsUsual, [](FakeBoard& b) { b.found.card = false; }, kAsUsual},
-    {prearm::kRestarted, kAsUsual,
-     [](FakeBoard& b) { b.reset = {reset::kWatchdog, true}; }, kAsUsual},
+    {prearm::kRestarted, kAsUsual, [](FakeBoard& b) { b.reset = {reset::kWatchdog, true}; },
+     kAsUsual},
     // A set of parameters that was torn: its beginning, and not the rest.
-    {prearm::kParameters, kAsUsual,
-     [](FakeBoard& b) { std::memcpy(b.storage.data(), "STRX", 4); }, kAsUsual},
+    {prearm::kParameters, kAsUsual, [](FakeBoard& b) { std::memcpy(b.storage.data(), "STRX", 4); },
+     kAsUsual},
     {prearm::kBattery, kAsUsual, kAsUsual,
      [](FakeFlight& f) {
        f.board.battery.dead = false;

@@ -274,7 +274,6 @@ void test_a_restart_in_flight_comes_back_disarmed_says_so_and_never_arms() {
   TEST_ASSERT_FALSE(accepts(flight, CommandKind::Arm));
   for (const auto& write : flight.board.escWrites) TEST_ASSERT_TRUE(areOff(write.commands));
   TEST_ASSERT_TRUE(flight.logSays("restarted while the motors were on: disarmed"));
-  TEST_ASSERT_TRUE(flight.logSays("boot_status"));
 }
 
 void test_the_board_remembers_whether_the_motors_are_on_and_its_watchdog_sees_each_tick() {

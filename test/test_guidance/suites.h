@@ -2,4 +2,6 @@
 
 void runGuidanceTests();
 void runStandTests();
+void runStickTests();
+void runSetpointTests();
 void runMissionTextTests();

@@ -9,6 +9,8 @@ int main() {
   UNITY_BEGIN();
   runGuidanceTests();
   runStandTests();
+  runStickTests();
+  runSetpointTests();
   runMissionTextTests();
   UNITY_END();
   return 0;

@@ -5,6 +5,7 @@
 namespace strix {
 
 bool FileCard::sync(std::uint32_t length) {
+  if (dead_) return false;
   if (path_.empty()) return true;
   if (file_ == nullptr || std::fflush(file_.get()) != 0) return false;
   std::error_code error;

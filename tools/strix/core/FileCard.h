@@ -9,8 +9,9 @@
 
 namespace strix {
 
-/// Never busy. The file ends where the last sync said it does, as the card's would. Without a path
-/// it takes everything and keeps nothing.
+/// Busy and broken only when it is told to be, as a card that stalls or dies. The file ends where
+/// the last sync said it does, as the card's would. Without a path it takes everything and keeps
+/// nothing.
 class FileCard {
  public:
   explicit FileCard(const std::string& path)
@@ -19,9 +20,10 @@ class FileCard {
   /// False when the file could not be made; errno says why.
   [[nodiscard]] bool open() const { return path_.empty() || file_ != nullptr; }
 
-  [[nodiscard]] bool busy() const { return false; }
+  [[nodiscard]] bool busy() const { return stalled_; }
 
   [[nodiscard]] bool writeSector(std::uint32_t index, const std::uint8_t (&data)[kSectorSize]) {
+    if (dead_) return false;
     if (file_ == nullptr) return path_.empty();
     const long offset = static_cast<long>(index) * static_cast<long>(kSectorSize);
     return std::fseek(file_.get(), offset, SEEK_SET) == 0 &&
@@ -30,6 +32,10 @@ class FileCard {
 
   [[nodiscard]] bool sync(std::uint32_t length);
 
+  // The outside.
+  void setStalled(bool stalled) { stalled_ = stalled; }  ///< it takes no sector until told again
+  void setDead(bool dead) { dead_ = dead; }              ///< it fails whatever it is asked
+
  private:
   struct Close {
     void operator()(std::FILE* file) const { std::fclose(file); }
@@ -37,6 +43,8 @@ class FileCard {
 
   std::string path_;
   std::unique_ptr<std::FILE, Close> file_;
+  bool stalled_ = false;
+  bool dead_ = false;
 };
 
 }  // namespace strix

@@ -30,10 +30,9 @@ struct ReplayResult {
 using FlightLogReader =
     LogReader<topic::SensorCombined, topic::SensorMag, topic::SensorBaro, topic::VehicleGpsPosition,
               topic::BatteryStatus, topic::EscStatus, topic::ManualControlSwitches, topic::InputRc,
-              topic::VehicleCommand, topic::BootStatus, topic::FlightConfig, topic::MissionLeg,
-              topic::ControlTick, topic::LogStatus, topic::VehicleAttitude,
-              topic::VehicleAngularVelocity, topic::WrenchSetpoint, topic::WrenchAchieved,
-              topic::ActuatorOutputs>;
+              topic::VehicleCommand, topic::FlightConfig, topic::MissionLeg, topic::ControlTick,
+              topic::LogStatus, topic::VehicleAttitude, topic::VehicleAngularVelocity,
+              topic::WrenchSetpoint, topic::WrenchAchieved, topic::ActuatorOutputs>;
 
 /// The next record of a topic that has not been reached yet.
 template <class Topic>
@@ -192,9 +191,7 @@ class Replay {
     const std::uint64_t limit = firstGap();
     board_.setTime(static_cast<Micros>(chosen.timestamp));
     board_.setDevices(devicesOf(chosen));
-    for (const topic::BootStatus& boot : log_.records<topic::BootStatus>()) {
-      board_.setReset({boot.reset_cause, boot.motors_were_on != 0});
-    }
+    board_.setReset({chosen.reset, chosen.in_flight != 0});
     result.begin = chosen.timestamp;
     result.logEnd = log_.records<topic::ControlTick>().back().timestamp;
     software_.setup();

@@ -198,6 +198,11 @@ class Flight {
     return refusal == nullptr ? "" : refusal;
   }
 
+  void cardFault(bool stalled, bool dead) {
+    board_.card().setStalled(stalled);
+    board_.card().setDead(dead);
+  }
+
   /// One pass of the loop at `now`.
   /// @return the commands the ESCs have after it
   Array4 loop(strix::Micros now) {
@@ -345,6 +350,8 @@ void bindFlight(nb::module_& m) {
            "index"_a = 0, "detail"_a = 0, "time_us"_a = 0,
            "A command as telemetry gives it; returns why it was refused, or ''")
       .def("texts", &Flight::texts, "What was said since this was asked last")
+      .def("card_fault", &Flight::cardFault, "stalled"_a, "dead"_a,
+           "From now on the log card takes no sector (stalled), or fails all it is asked (dead)")
       .def("loop", &Flight::loop, "now_us"_a, "One pass; returns the ESC commands M1..M4 after it")
       .def("put_telemetry", &Flight::putTelemetry, "heard"_a)
       .def("take_telemetry", &Flight::takeTelemetry, "What it sends; made with telemetry=True")
