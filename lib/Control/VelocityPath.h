@@ -38,10 +38,10 @@ class VelocityFollower {
   /// One step. @return the way made in it, m
   Vector follow(const Vector& wanted, float most, float jerk, float dt) {
     const Vector lacking = wanted - velocity_;
-    const float size = lacking.norm();
+    const float size = lengthOf(lacking);
     Vector change = -acceleration_;
     if (size > 0.0F) change += (asked(size, most, jerk) / size) * lacking;
-    const float length = change.norm();
+    const float length = lengthOf(change);
     const float longest = jerk * dt;
     if (length > longest) change *= longest / length;
     if (size < kRest && wanted.squaredNorm() == 0.0F && length <= longest) {  // rests
@@ -62,6 +62,11 @@ class VelocityFollower {
  private:
   static constexpr float kGain = 5.0F;   ///< 1/s, ours: slower than the attitude loop
   static constexpr float kRest = 1e-3F;  ///< m/s
+
+  [[nodiscard]] static float lengthOf(const Vector& v) {
+    if constexpr (N == 1) return v[0] < 0.0F ? -v[0] : v[0];
+    return v.norm();
+  }
 
   [[nodiscard]] static float asked(float size, float most, float jerk) {
     const float linear = jerk / (kGain * kGain);
@@ -100,8 +105,10 @@ class VelocityPath {
     Reference& r = reference_;
     const TrajectoryLimits& l = b.limits;
     float down = clamped(wantedNed.z(), l.speedVertical);
-    const float upMost = approachSpeed(b.height + r.positionNed.z(), l.acceleration);
-    if (-down > upMost) down = -upMost;
+    if (down < 0.0F) {
+      const float most = approachSpeed(b.height + r.positionNed.z(), l.acceleration);
+      if (-down > most) down = -most;
+    }
     using Down = VelocityFollower<1>::Vector;
     r.positionNed.z() += vertical_.follow(Down(down), l.acceleration, l.jerk, dt).x();
     r.velocityNed.z() = vertical_.velocity().x();
@@ -117,17 +124,23 @@ class VelocityPath {
     r.jerkNed.head<2>() = level_.jerk();
   }
 
-  /// North and east go on as the aircraft does; its tilt is their acceleration.
+  /// North and east are the aircraft's.
+  void copyLevel(const VehicleState& estimate) {
+    reference_.positionNed.head<2>() = estimate.positionNed.head<2>();
+    reference_.velocityNed.head<2>() = estimate.velocityNed.head<2>();
+    reference_.accelerationNed.head<2>().setZero();
+    reference_.jerkNed.head<2>().setZero();
+  }
+
+  /// So that they go on from there: its tilt is their acceleration.
   void followLevel(const VehicleState& estimate, float most) {
     const Vector3f up = rotateToNed(estimate.attitude, {0.0F, 0.0F, -1.0F});
     Vector2f acceleration = Vector2f::Zero();
     if (up.z() < -0.5F) acceleration = (kGravity / -up.z()) * up.head<2>();
     acceleration *= shortening(acceleration, most);
     level_.start(estimate.velocityNed.head<2>(), acceleration);
-    reference_.positionNed.head<2>() = estimate.positionNed.head<2>();
-    reference_.velocityNed.head<2>() = level_.velocity();
+    copyLevel(estimate);
     reference_.accelerationNed.head<2>() = acceleration;
-    reference_.jerkNed.head<2>().setZero();
   }
 
   /// Height and climb are the aircraft's.
@@ -167,8 +180,14 @@ class VelocityPath {
 
  private:
   [[nodiscard]] Vector2f keptInside(const Vector2f& wanted, const PathBounds& b) const {
+    // From so far away the full speed may be flown (approachSpeed): most of the time.
+    const float speedMost = b.limits.speedHorizontal;
+    const float braking = speedMost * speedMost / b.limits.acceleration;
+    const float free = b.radius - (speedMost > braking ? speedMost : braking);
     const Vector2f place = reference_.positionNed.head<2>();
-    const float distance = place.norm();
+    const float square = place.squaredNorm();
+    if (free > 0.0F && square < free * free) return wanted;
+    const float distance = squareRoot(square);
     if (!(distance > 0.0F)) return wanted;
     const Vector2f outward = place / distance;
     const float most = approachSpeed(b.radius - distance, b.limits.acceleration);

@@ -121,6 +121,7 @@ class Guidance {
         startReturn(now, estimate);
         break;
       case FlightState::Land:
+        if (before == FlightState::Blind) break;  // on its way down, fast: the IMU is back
         stop(now, estimate);
         if (trajectory_.arrived()) startDescent(now);
         break;
@@ -159,8 +160,9 @@ class Guidance {
         if (idles_) sticks_.start(now, estimate);
         return sticks_.fly(now, input_, mode_, estimate);
       case Source::Setpoint:
-        return state_ == FlightState::Blind ? setpoints_.descend(now, estimate)
-                                            : setpoints_.fly(now, estimate);
+        return state_ == FlightState::Guided
+                   ? setpoints_.fly(now, estimate)
+                   : setpoints_.descend(now, estimate, state_ == FlightState::Blind);
       case Source::Ramp:
         if (state_ == FlightState::Land &&
             -ramp_.reference().positionNed.z() < config_.landingSlowHeight) {
@@ -232,7 +234,9 @@ class Guidance {
   /// where the reference had no place.
   void takeOver(Micros now, const VehicleState& estimate) {
     if (source_ != Source::Trajectory) {
-      Reference from = source_ == Source::Stand ? motionOf(estimate) : reference();
+      Reference from = reference();
+      if (source_ == Source::Stand) from = motionOf(estimate);
+      if (source_ == Source::Sticks) from = sticks_.motion(estimate);
       if (source_ == Source::Attitude) {
         from.positionNed.head<2>() = estimate.positionNed.head<2>();
         from.velocityNed.head<2>() = estimate.velocityNed.head<2>();

@@ -40,12 +40,16 @@ class SetpointFlight {
   }
 
   /// Down on a model of the aircraft that is good for seconds: as fast as it can be stopped again,
-  /// and at the ground no faster than a leg takes without harm.
-  const Reference& descend(Micros now, const VehicleState& estimate) {
+  /// and at the ground no faster than a leg takes without harm. Once there is an IMU again: slower,
+  /// and what is too fast then is braked as hard.
+  const Reference& descend(Micros now, const VehicleState& estimate, bool blind) {
     const float dt = step(now);
-    const float above = -estimate.positionNed.z() - kBrakeUntil;
-    float sink = kSinkAtGround;  // v^2 = v0^2 + 2 (a/2) s: half of what the path may brake with
-    if (above > 0.0F) sink = squareRoot(sink * sink + kBlindAcceleration * above);
+    float sink = kLandingSink;
+    if (blind) {
+      const float above = -estimate.positionNed.z() - kBrakeUntil;
+      sink = kSinkAtGround;  // v^2 = v0^2 + 2 (a/2) s: half of what the path may brake with
+      if (above > 0.0F) sink = squareRoot(sink * sink + kBlindAcceleration * above);
+    }
     PathBounds b = bounds_;
     b.limits.speedVertical = kMostSink;
     b.limits.acceleration = kBlindAcceleration;
@@ -62,6 +66,7 @@ class SetpointFlight {
   static constexpr float kInsideFence = 1.0F;  ///< m, ours: what an estimate wanders
   static constexpr float kLead = 1.5F;         ///< m, ours: within what the controller acts on
   // ours, of flights without an IMU: docs/blind-flight.md.
+  static constexpr float kLandingSink = 0.5F;        ///< m/s, as every landing's
   static constexpr float kSinkAtGround = 1.2F;       ///< m/s
   static constexpr float kMostSink = 4.0F;           ///< m/s
   static constexpr float kBrakeUntil = 0.6F;         ///< m above the start: the model's height errs

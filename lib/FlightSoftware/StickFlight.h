@@ -31,7 +31,14 @@ class StickFlight {
     from.yaw = yawOf(estimate.attitude);
     path_.start(from);
     path_.followLevel(estimate, bounds_.limits.acceleration);
+    places_ = true;
     reference_ = path_.reference();
+  }
+
+  /// The motion that another flight goes on from.
+  [[nodiscard]] Reference motion(const VehicleState& estimate) {
+    if (!places_) path_.followLevel(estimate, bounds_.limits.acceleration);
+    return path_.reference();
   }
 
   /// @param mode  Attitude, AltitudeHold or PositionHold
@@ -41,17 +48,19 @@ class StickFlight {
     const Sticks sticks = sound(input);
     const float heading = yawOf(estimate.attitude);
     path_.turn(sticks.yaw * bounds_.limits.yawRate, heading, bounds_.limits, kHeadingLead, dt);
+    const bool places = mode == PilotMode::PositionHold;
+    if (!places) path_.copyLevel(estimate);
+    if (places && !places_) path_.followLevel(estimate, bounds_.limits.acceleration);
+    places_ = places;
     if (mode == PilotMode::Attitude) {
-      path_.followLevel(estimate, bounds_.limits.acceleration);
       path_.followHeight(estimate);
     } else {
-      const bool places = mode == PilotMode::PositionHold;
-      if (!places) path_.followLevel(estimate, bounds_.limits.acceleration);
-      path_.move(wantedVelocity(sticks, heading), bounds_, places, dt);
+      const Vector3f wanted = wantedVelocity(sticks, places ? heading : 0.0F);
+      path_.move(wanted, bounds_, places, dt);
       path_.boundLead(estimate, kLead);
     }
     reference_ = path_.reference();
-    if (mode == PilotMode::PositionHold) return reference_;
+    if (places) return reference_;
     reference_.mode =
         mode == PilotMode::Attitude ? ReferenceMode::Attitude : ReferenceMode::AttitudeHeight;
     reference_.attitude =
@@ -120,6 +129,7 @@ class StickFlight {
   PathBounds bounds_;
   VelocityPath path_;
   Reference reference_;
+  bool places_ = false;  ///< the path has a place
   Micros last_ = 0;
 };
 

@@ -198,6 +198,29 @@ void test_without_an_imu_the_descent_is_quick_and_ends_gently() {
   }
 }
 
+void test_an_imu_that_comes_back_in_the_descent_still_means_a_gentle_landing() {
+  for (const double height : {1.5, 2.5, 5.0, 10.0}) {
+    for (const float blind : {0.03F, 0.3F, 0.6F, 1.0F}) {
+      StickRig rig(FlightState::Manual, 1.0F);
+      rig.quad.position.z() = -height;
+      rig.enter(FlightState::Blind);
+      rig.run(blind);
+      const Reference before = rig.reference();
+      rig.enter(FlightState::Land);
+      rig.run(StickRig::kPeriod);
+      assertNear(0.02F, before.velocityNed, rig.reference().velocityNed);
+      float time = 0.0F;
+      while (rig.quad.position.z() < 0.0 && time < 30.0F) {
+        rig.run(StickRig::kPeriod);
+        time += StickRig::kPeriod;
+      }
+      TEST_ASSERT_TRUE(time < 30.0F);
+      // 0.5 m/s as every landing, unless there is no height left to brake in.
+      TEST_ASSERT_TRUE(rig.quad.velocity.z() < (height < 3.0 ? 1.8 : 0.7));
+    }
+  }
+}
+
 }  // namespace
 
 void runSetpointTests() {
@@ -212,4 +235,5 @@ void runSetpointTests() {
   RUN_TEST(test_a_mission_not_begun_waits_for_the_start_after_a_flight_by_the_sticks);
   RUN_TEST(test_a_start_switch_that_is_still_on_ends_no_hold);
   RUN_TEST(test_without_an_imu_the_descent_is_quick_and_ends_gently);
+  RUN_TEST(test_an_imu_that_comes_back_in_the_descent_still_means_a_gentle_landing);
 }

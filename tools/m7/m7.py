@@ -78,7 +78,7 @@ def compile_flags() -> list[str]:
 
 
 def include_flags() -> list[str]:
-    """Where headers are: ours with -I; Eigen and MAVLink, not ours to warn about, as system headers."""
+    """Where headers are: ours with -I; Eigen and MAVLink, which are not, as system headers."""
     libraries = sorted(manifest.parent for manifest in (ROOT / "lib").glob("*/library.json"))
     ours = [HERE, *libraries, ROOT / "include"]
     eigen = Path(sysconfig.get_path("purelib"), "cmeel.prefix/include/eigen3")

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from strix.calibrate.cli import calibrate_app
+from strix.campaign.cli import campaign
 from strix.command import says_what_is_wrong
 from strix.errors import BadInput
 from strix.identify.cli import identify_app
@@ -27,6 +28,7 @@ app = typer.Typer(
 app.add_typer(log_app, name="log")
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(identify_app, name="identify")
+app.command(epilog="Example: strix campaign --n 500 --seed 1 --out out/campaign")(campaign)
 app.command(epilog="Example: strix convert out/flight.ulg -o flight.mcap")(cli_view.convert)
 
 

@@ -198,7 +198,7 @@ class Flight {
     return refusal == nullptr ? "" : refusal;
   }
 
-  void cardFault(bool stalled, bool dead) {
+  void setCard(bool stalled, bool dead) {
     board_.card().setStalled(stalled);
     board_.card().setDead(dead);
   }
@@ -350,7 +350,7 @@ void bindFlight(nb::module_& m) {
            "index"_a = 0, "detail"_a = 0, "time_us"_a = 0,
            "A command as telemetry gives it; returns why it was refused, or ''")
       .def("texts", &Flight::texts, "What was said since this was asked last")
-      .def("card_fault", &Flight::cardFault, "stalled"_a, "dead"_a,
+      .def("set_card", &Flight::setCard, "stalled"_a, "dead"_a,
            "From now on the log card takes no sector (stalled), or fails all it is asked (dead)")
       .def("loop", &Flight::loop, "now_us"_a, "One pass; returns the ESC commands M1..M4 after it")
       .def("put_telemetry", &Flight::putTelemetry, "heard"_a)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from strix.plant.battery import ELECTRONICS_W, MOTOR_EFFICIENCY, Battery
 from strix.plant.frames import (
@@ -33,7 +33,8 @@ _HOVER_ROTOR_DRAG_PER_S = 0.2
 _BODY_DRAG_AREA_M2 = 0.01
 _AIR_DENSITY_KG_M3 = 1.225  # standard atmosphere at sea level
 
-_WIND_STREAM = 0  # number of the random stream; the sensors have the others
+# Numbers of the random streams; the sensors have 1 to 6.
+_WIND_STREAM, _LATER_WIND_STREAM = 0, 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +63,8 @@ class Plant:
         self, vehicle: VehicleNumbers, surroundings: Surroundings, heading_rad: float, seed: int
     ) -> None:
         self._vehicle = vehicle
+        self._surroundings = surroundings
+        self._seed = seed
         self._body: RigidBody | GimballedBody
         if surroundings.stand is None:
             self._body = RigidBody(vehicle, level_at_heading(heading_rad))
@@ -121,6 +124,31 @@ class Plant:
         )
         self._speeds = [rotor_speed] * 4
         self._truth = self._observe(self._truth.specific_force_body_m_s2)
+
+    # What goes wrong with the vehicle and the air around it, from now on.
+
+    def weaken_rotor(self, index: int, strength: float) -> None:
+        """A rotor (0 for M1) gives so much of its thrust and torque; 0: it has lost its blades."""
+        x, y, _, _ = self._rotors[index]
+        vehicle, rotor = self._vehicle, self._vehicle.rotors[index]
+        strength *= rotor.strength
+        self._rotors[index] = (
+            x,
+            y,
+            vehicle.thrust_constant * strength,
+            -rotor.spin * vehicle.torque_constant * strength,
+        )
+        self._thrust_constants = tuple(rotor[2] for rotor in self._rotors)
+
+    def blow(self, wind_mean_ned_m_s: Vector) -> None:
+        """Another mean wind with gusts."""
+        around = replace(self._surroundings, wind_mean_ned_m_s=wind_mean_ned_m_s, gusts=True)
+        self._wind = Wind(around, normal_stream(self._seed, _LATER_WIND_STREAM))
+
+    def drain_battery(self, charge: float) -> None:
+        """The battery has no more than this left, of 1."""
+        if self._battery is not None:
+            self._battery.charge = min(self._battery.charge, charge)
 
     def step(self, commands: Sequence[float], duration_us: int) -> None:
         """Hold four ESC commands (M1..M4) for a time."""
