@@ -1,12 +1,12 @@
 /// From readings to the estimate that guidance and control get.
 #pragma once
 
+#include "BlindFlight.h"
 #include "Controller.h"
 #include "CorrectionSmoother.h"
 #include "FlightLog.h"
 #include "FlightSoftwareConfig.h"
 #include "GyroFilter.h"
-#include "ModelFlight.h"
 #include "Motors.h"
 #include "Navigation.h"
 #include "Sensors.h"
@@ -43,6 +43,10 @@ class Estimation {
       heard = true;
       const ImuRaw& raw = sensors_.getIMUMeas();
       const ImuSample imu = sensors_.processIMUMeas(raw);
+      if (blind_.active() && !resumed_) {  // in the gap only the model has gone on
+        navigation_.restart(blind_.state(), imu.sampled);
+        resumed_ = true;
+      }
       startCalibration_.addImu(imu.sampled, imu.accel, imu.gyro);  // until it is done;
       navigation_.predict(imu.accel, imu.gyro, imu.sampled);       // from then on
       navigation_.updateTiltMeas(imu.accel);
@@ -57,6 +61,7 @@ class Estimation {
       const Vector3f field = sensors_.processMagMeas(raw, throttle);
       startCalibration_.addMag(field);
       navigation_.updateMagMeas(field, now);
+      blind_.updateMagMeas(field);
       logger_.logMag(toRecord(time, clock_.at(raw.sampled), raw));
       logAid<AidSource::Magnetometer>(time, filter().magInnovation());
     }
@@ -64,7 +69,9 @@ class Estimation {
       heard = true;
       const AltRaw& raw = sensors_.getAltMeas();
       startCalibration_.addPressure(raw.pressure);
-      navigation_.updateAltMeas(sensors_.processAltMeas(raw), now);
+      const float height = sensors_.processAltMeas(raw);
+      navigation_.updateAltMeas(height, now);
+      blind_.updateAltMeas(height);
       logger_.logAlt(toRecord(time, clock_.at(raw.sampled), raw));
       logAid<AidSource::Altimeter>(time, filter().altInnovation());
     }
@@ -146,7 +153,12 @@ class Estimation {
   [[nodiscard]] const ESKF<States>& filter() const { return navigation_.filter(); }
   [[nodiscard]] const CorrectionSmoother& smoother() const { return smoother_; }
   [[nodiscard]] const GyroFilter& gyroFilter() const { return gyroFilter_; }
-  [[nodiscard]] ModelFlight& blind() { return blind_; }
+  [[nodiscard]] BlindFlight& blind() { return blind_; }
+  /// The IMU is lost.
+  void startBlind(const VehicleState& estimate) {
+    blind_.start(estimate);
+    resumed_ = false;
+  }
   /// The filter's attitude is near the model's: ours, 15 deg.
   [[nodiscard]] bool agreesWithModel() const {
     constexpr float kNear = 15.0F * kDegToRad;
@@ -172,13 +184,14 @@ class Estimation {
   OriginAverage origin_;
   Navigation<States> navigation_;
   CorrectionSmoother smoother_;
-  ModelFlight blind_;
+  BlindFlight blind_;
   GyroFilter gyroFilter_;
   Vector3f controlRate_ = Vector3f::Zero();    ///< rad/s, body, filtered for the controller
   Vector3f specificForce_ = Vector3f::Zero();  ///< m/s^2, body
   bool fixed_ = false;                         ///< by GPS, in this pass
   bool fixedSinceTick_ = false;
   bool originStands_ = false;
+  bool resumed_ = false;  ///< from the model
 };
 
 }  // namespace strix

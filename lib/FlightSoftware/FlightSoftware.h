@@ -75,7 +75,6 @@ class FlightSoftware {
     hazards_.start(now_);
     recorder_.start(now_);
     stateLog_.start(now_ + 8 * periodFromHz(Controller::kRateHz));
-    blindTask_.start(now_ + 9 * periodFromHz(Controller::kRateHz));
     logger_.begin(time_, {config_.vehicle.name,
                           Board::kName,
                           kVersion,
@@ -188,7 +187,7 @@ class FlightSoftware {
   void controlTick(Micros now, LogTime time) {
     board_.feedWatchdog();
     VehicleState estimate = estimation_.estimate(motors_.armed());
-    flyBlind(now, estimate);
+    flyBlind(estimate);
     readPower(time);
     readRadio(now, time);
     updateStateMachine(now, time, estimate);
@@ -220,12 +219,12 @@ class FlightSoftware {
   }
 
   /// What the model of the aircraft says, while no IMU does.
-  void flyBlind(Micros now, VehicleState& estimate) {
+  void flyBlind(VehicleState& estimate) {
     const std::array<float, kControlCount>& wrench = controller_.wrenchEstimate().now();
     if (fsm_.state() == FlightState::Blind) {
       estimate = estimation_.blind().update(wrench, kControlPeriod);
-    } else if (blindTask_.run(now) && motors_.armed()) {
-      estimation_.blind().observe(wrench, estimate, toSeconds(kBlindPeriod));
+    } else if (motors_.armed()) {
+      estimation_.blind().observe(wrench, estimate, kControlPeriod);
     }
   }
 
@@ -327,7 +326,7 @@ class FlightSoftware {
     pilot_.done(row.failsafe ? ~condition::kNone : row.when);
     if (fsm_.state() == FlightState::Armed) estimation_.blind().reset();
     if (fsm_.state() == FlightState::Blind) {
-      estimation_.blind().start(estimate);
+      estimation_.startBlind(estimate);
       imuBack_.reset(now);
     }
     guidance_.enter(fsm_.state(), now, estimate, (row.when & condition::kHoldAsked) != 0);
@@ -415,9 +414,7 @@ class FlightSoftware {
   Persistence imuBack_{200'000};  ///< ours: 200 samples in a row
   PreArmSet wrongConfig_;         ///< what no flight can mend
   float cosArmTilt_ = 0.0F;
-  static constexpr Micros kBlindPeriod = periodFromHz(50);
   PeriodicTask stateLog_{periodFromHz(10)};
-  PeriodicTask blindTask_{kBlindPeriod};
   topic::ControlTick lastTick_;
   ConditionSet conditions_ = condition::kNone;  ///< of the last tick
   PreArmSet preArm_ = prearm::kNotCalibrated;

@@ -29,6 +29,9 @@ class ComplementaryFilter {
     bias_.setZero();
   }
 
+  /// Goes on from this attitude; the bias stays.
+  void restart(const Quaternion& attitude) { attitude_ = attitude; }
+
   /// @param accel  specific force, m/s^2, body    @param gyro  rad/s, body    @param dt  s
   void update(const Vector3f& accel, const Vector3f& gyro, float dt) {
     attitude_ = renormalized(attitude_ * quaternionExp((gyro - bias_) * dt));

@@ -35,6 +35,9 @@ class Navigation {
   /// Starts from rest at the origin. Until then every call below does nothing.
   void initialize(const Alignment& alignment, float gravity, Micros now);
 
+  /// Goes on from a state that no IMU led to; before the first predict() after the gap.
+  void restart(const VehicleState& state, Micros now);
+
   /// @param motors  what they did in the last pass
   void setMotors(MotorState motors) { motors_ = motors; }
 
@@ -152,6 +155,18 @@ void Navigation<States>::initialize(const Alignment& alignment, float gravity, M
   definite_ = {};
   health_ = health::kNone;
   started_ = true;
+}
+
+template <int States>
+void Navigation<States>::restart(const VehicleState& state, Micros now) {
+  history_.clear(now);
+  standstill_ = StandstillDetector(config_.standstill);
+  vibration_ = Vibration{};
+  definite_ = {};
+  filter_.restart(state.attitude, state.positionNed, state.velocityNed);
+  complementary_.restart(state.attitude);
+  lastGood_ = filter_.state();
+  lastSample_ = agreed_ = now;
 }
 
 template <int States>

@@ -6,7 +6,6 @@
 /// commands are PMTK 251, 300, 314 and 220 of the "PMTK command packet" manual.
 #pragma once
 
-#include <cinttypes>
 #include <cstdint>
 #include <cstdio>
 #include <deque>
@@ -29,11 +28,11 @@ inline std::string nmeaAngleText(std::int64_t minutes, int decimals, int degreeD
                                  const char* positive, const char* negative) {
   std::int64_t unit = 1;
   for (int i = 0; i < decimals; ++i) unit *= 10;
-  const std::int64_t size = minutes < 0 ? -minutes : minutes;
+  // long long, not PRId64: newlib has that only behind headers that clang-format puts last.
+  const long long size = minutes < 0 ? -minutes : minutes;
   char text[48];
-  std::snprintf(text, sizeof(text), "%0*" PRId64 "%02" PRId64 ".%0*" PRId64 ",%s", degreeDigits,
-                size / (60 * unit), size / unit % 60, decimals, size % unit,
-                minutes < 0 ? negative : positive);
+  std::snprintf(text, sizeof(text), "%0*lld%02lld.%0*lld,%s", degreeDigits, size / (60 * unit),
+                size / unit % 60, decimals, size % unit, minutes < 0 ? negative : positive);
   return text;
 }
 

@@ -76,7 +76,8 @@ void test_a_reset_in_flight_is_remembered_and_one_on_the_ground_is_not() {
 
 void test_a_register_that_lost_its_supply_says_nothing() {
   powerUpTeensy();
-  for (const std::uint32_t rubbish : {0U, 0xFFFFFFFFU, 0xA5A5A5A5U, 1U, ~RetainedMotors::kOn}) {
+  for (const std::uint32_t rubbish : std::initializer_list<std::uint32_t>{
+           0U, 0xFFFFFFFFU, 0xA5A5A5A5U, 1U, ~RetainedMotors::kOn}) {
     fakeTeensy().retained.word = rubbish;
     TEST_ASSERT_FALSE(takeResetStatus().motorsWereOn);
   }

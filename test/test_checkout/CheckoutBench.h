@@ -18,7 +18,8 @@ namespace strix {
 constexpr CheckoutPins kTestPins{20, 18, 19, 17, 16, 7, 8, 30, 31, 32};
 
 [[nodiscard]] inline FlightSoftwareConfig benchConfig(const Airframe& airframe = kFlown) {
-  return flightConfig(airframe.vehicle, airframe.gains, kFirstFlight, kDeclination);
+  return flightConfig(airframe.vehicle, airframe.gains, kFirstFlight,
+                      Parameters{}.declination * kDegToRad);
 }
 
 class CheckoutBench {

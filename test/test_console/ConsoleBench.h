@@ -88,7 +88,7 @@ struct FakeLogs {
     if (silent) return 0;
     for (const auto& [itsNumber, bytes] : logs) {
       if (itsNumber != number) continue;
-      const std::size_t size = std::min(most, bytes.size() - offset);
+      const std::size_t size = std::min<std::size_t>(most, bytes.size() - offset);
       for (std::size_t i = 0; i < size; ++i) {
         out[i] = static_cast<std::uint8_t>(bytes[offset + i]);
       }

@@ -53,7 +53,8 @@ void test_a_log_arrives_byte_for_byte_with_its_length_and_crc() {
     Crc32 crc;
     crc.update(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
     std::array<char, 64> end{};
-    std::snprintf(end.data(), end.size(), "end %zu bytes crc32 %08x", size, crc.value());
+    std::snprintf(end.data(), end.size(), "end %zu bytes crc32 %08lx", size,
+                  static_cast<unsigned long>(crc.value()));
     assertIs(end.data(), lines[lines.size() - 2]);
   }
 }

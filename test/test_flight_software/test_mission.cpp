@@ -119,6 +119,7 @@ void test_the_legs_are_flown_in_order_and_turn_from_the_heading_at_take_off() {
     assertNear(0.01F, Vector3f{0.0F, 0.0F, -2.0F}, flight.state.positionNed);
     for (std::size_t i = 0; i < kFirstFlight.legCount; ++i) {
       TEST_ASSERT_TRUE(flight.has(condition::kLegsRemain));
+      flight.enter(FlightState::Hold);
       flight.enter(FlightState::Waypoint);
       TEST_ASSERT_TRUE(flight.follow() < 30'000'000);
       const Leg& leg = kFirstFlight.legs[i];

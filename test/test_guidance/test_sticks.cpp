@@ -176,6 +176,10 @@ void test_without_gps_position_hold_becomes_altitude_hold_and_comes_back_smoothl
   TEST_ASSERT_TRUE(rig.levelSpeed() > 4.0);  // full stick is a tilt now
   rig.positionKnown = true;
   rig.sticks.pitch = 0.0F;
+  rig.run(StickRig::kPeriod);
+  // It goes on from the tilt that is there: 25 deg forward, as much as is fed forward.
+  TEST_ASSERT_FLOAT_WITHIN(0.02F, 2.0F, rig.reference().accelerationNed.head<2>().norm());
+  assertNear(0.05F, rig.quad.state().velocityNed, rig.reference().velocityNed);
   double fastest = 0.0;
   rig.run(6.0F, [&] {
     TEST_ASSERT_TRUE(rig.guidance.effectiveMode() == PilotMode::PositionHold);

@@ -25,3 +25,4 @@ void runHealthTests();
 void runDelayTests();
 void runPolicyTests();
 void runRecoveryTests();
+void runBlindTests();

@@ -30,6 +30,7 @@ int main() {
   runDelayTests();
   runPolicyTests();
   runRecoveryTests();
+  runBlindTests();
   UNITY_END();
   return 0;
 }

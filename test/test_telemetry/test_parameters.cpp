@@ -1,5 +1,7 @@
 // Parameters: the list, single ones, changes, and what keeps them.
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <set>
 
 #include "TelemetryBench.h"
@@ -9,13 +11,19 @@ using namespace strix;
 
 namespace {
 
+/// As the protocol has it: 16 characters, and a zero only behind a shorter one.
+template <std::size_t Size>
+void setName(char (&field)[Size], const char* name) {
+  std::memcpy(field, name, std::min(Size, std::strlen(name)));
+}
+
 mavlink_param_set_t setMessage(const char* name, float value,
                                std::uint8_t type = MAV_PARAM_TYPE_REAL32) {
   mavlink_param_set_t m{};
   m.param_value = value;
   m.target_system = 1;
   m.target_component = kAutopilot;
-  std::strncpy(m.param_id, name, sizeof m.param_id);
+  setName(m.param_id, name);
   m.param_type = type;
   return m;
 }
@@ -56,7 +64,7 @@ void test_one_is_read_by_name_or_by_place() {
   TelemetryBench bench;
   const auto read = [&bench](std::int16_t index, const char* name) {
     mavlink_param_request_read_t m{index, 1, kAutopilot, {}};
-    std::strncpy(m.param_id, name, sizeof m.param_id);
+    setName(m.param_id, name);
     bench.heard.clear();
     bench.say(mavlink_msg_param_request_read_encode_status, m);
     bench.run(0.2F);

@@ -7,7 +7,10 @@ import importlib
 import json
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import cache, partial
@@ -181,15 +184,24 @@ def _fly_all(
         yield from _on_cluster(job, indices, scheduler)
         return
     # Spawned, not forked: each process loads its own compiled core.
+    spawn = multiprocessing.get_context("spawn")
     workers = min(processes or os.cpu_count() or 1, len(indices))
-    with multiprocessing.get_context("spawn").Pool(workers, _ignore_interrupts) as pool:
-        yield from pool.imap_unordered(job, indices)
+    with ProcessPoolExecutor(workers, spawn, initializer=_ignore_interrupts) as pool:
+        flights = [pool.submit(job, index) for index in indices]
+        try:
+            for flight in as_completed(flights):
+                yield flight.result()
+        except BrokenProcessPool:
+            raise BadInput(
+                "a process was ended from outside while it flew; what was flown is kept: go on by "
+                "--resume"
+            ) from None
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 def _ignore_interrupts() -> None:
-    """Ctrl-C is the parent's to answer: it ends the pool."""
-    import signal
-
+    """Ctrl-C is the parent's to answer: it lets those in the air land, and starts no other."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
