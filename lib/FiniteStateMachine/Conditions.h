@@ -60,7 +60,8 @@ using PreArmSet = std::uint32_t;
   X(ImuBack, "the IMU is heard again, and its estimate can be flown with")   \
   X(CalibrateAsked, "calibrate again: asked for")                            \
   X(MotorTestAsked, "turn one motor: asked for")                             \
-  X(MotorTestDone, "it has turned as long as asked")
+  X(MotorTestDone, "it has turned as long as asked")                         \
+  X(Astray, "the path has ended and the aircraft is not there, for too long")
 
 namespace condition {
 enum Place : std::uint8_t {

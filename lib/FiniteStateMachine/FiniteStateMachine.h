@@ -33,7 +33,7 @@ constexpr StateSet kFailsafeStates =
     in(FlightState::Return, FlightState::Land, FlightState::Blind, FlightState::Safe);
 
 // clang-format off
-constexpr std::array<Transition, 76> kTransitions{{
+constexpr std::array<Transition, 77> kTransitions{{
     // from                                              when (all of)                                    unless (any of)                                             to                          failsafe  said
     // Motors off at once. Nothing below can keep them on.
     {kMotorsOn,                                          condition::kKill,                                condition::kNone,                                           FlightState::Safe,          true,     "killed: motors off"},
@@ -86,6 +86,7 @@ constexpr std::array<Transition, 76> kTransitions{{
     {kAutomatic,                                         condition::kImuSaturated,                        condition::kNone,                                           FlightState::Land,          true,     "IMU saturated: landing"},
     {kAutomatic,                                         condition::kMotorsSaturated,                     condition::kNone,                                           FlightState::Land,          true,     "motors at their limits: landing"},
     {kAutomatic,                                         condition::kOverrun,                             condition::kNone,                                           FlightState::Land,          true,     "loop too slow: landing"},
+    {kAutomatic,                                         condition::kAstray,                              condition::kNone,                                           FlightState::Land,          true,     "does not get there: landing"},
     {kAutomatic | in(FlightState::Manual),               condition::kLandAsked,                           condition::kNone,                                           FlightState::Land,          false,    "landing, as asked"},
     // Hazards that leave time to fly home; a take-off that meets one lands.
     {in(FlightState::Takeoff),                           condition::kOutsideFence,                        condition::kNone,                                           FlightState::Land,          true,     "outside the fence: landing"},

@@ -30,10 +30,13 @@ class Persistence {
   bool held_ = false;
 };
 
-/// On the ground while landing: the aircraft does not sink although little thrust is left.
+/// On the ground while landing: the aircraft does not sink although little thrust is left; or, when
+/// the estimate has lost its height, it does not fall although next to none is left.
 struct TouchDownConfig {
   float thrustFraction = 0.75F;  ///< of the weight
   float sinkRate = 0.15F;        ///< m/s
+  float fallThrust = 0.5F;       ///< of the weight, ours: no vehicle file errs by a factor of two
+  float fallForce = 0.75F;       ///< g of specific force, ours: midway between falling and standing
   Micros duration = 400'000;
 };
 

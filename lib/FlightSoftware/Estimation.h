@@ -78,7 +78,8 @@ class Estimation {
     if (sensors_.gpsUpdate(now)) {
       heard = true;
       const GpsRaw& raw = sensors_.getGPSMeas();
-      if (sensors_.gpsUsable(raw)) {
+      const bool flies = throttle > 0.0F;  // a receiver may keep its place while it is not moved
+      if (sensors_.gpsUsable(raw) && !(flies && sensors_.gpsStuck())) {
         if (!originStands_) averageOrigin(raw);
         const GpsSample gps = sensors_.processGPSMeas(raw);
         navigation_.updateGPSMeas(gps.positionNed, gps.velocityNed, now);

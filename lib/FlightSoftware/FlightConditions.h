@@ -95,15 +95,19 @@ ConditionSet FlightSoftware<Board, States>::ownConditions(Micros now,
   return set;
 }
 
-/// Where the aircraft may come down: little thrust is left, and it does not sink.
+/// Where the aircraft may come down: little thrust is left, and it neither sinks nor falls.
 template <class Board, int States>
 bool FlightSoftware<Board, States>::standsOnGround(Micros now, const VehicleState& estimate) {
   const FlightState state = fsm_.state();
   const bool may =
       state == FlightState::Land || (state == FlightState::Manual && pilot_.throttleLow());
-  return touchDown_.update(
-      now, may && motors_.achieved().thrust < config_.touchDown.thrustFraction * weight() &&
-               estimate.velocityNed.z() < config_.touchDown.sinkRate);
+  const TouchDownConfig& c = config_.touchDown;
+  const float thrust = motors_.achieved().thrust;
+  const float force = c.fallForce * kGravity;
+  const bool sinks = estimate.velocityNed.z() >= c.sinkRate;
+  const bool carried =
+      thrust < c.fallThrust * weight() && estimation_.specificForce().squaredNorm() > force * force;
+  return touchDown_.update(now, may && thrust < c.thrustFraction * weight() && (!sinks || carried));
 }
 
 }  // namespace strix

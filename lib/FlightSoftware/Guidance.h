@@ -21,11 +21,13 @@ struct GuidanceConfig {
   float arrivalRadius = 0.5F;            ///< m
   float arrivalSpeed = 0.4F;             ///< m/s
   float arrivalYaw = 10.0F * kDegToRad;  ///< rad
-  float landingDepth = 3.0F;             ///< m below the start the landing ramp aims at
-  float landingSlowHeight = 1.0F;        ///< m above the start, as PX4's MPC_LAND_ALT3: below it
-  float landingSlowSpeed = 0.3F;         ///< m/s, as its MPC_LAND_CRWL
-  float returnHeight = 3.0F;             ///< m, ours: above people and fences on the way home
-  float standThrust = 0.6F;  ///< of the weight, ours: near hover, and the stand holds it
+  /// After a path's end, ours: gusts and an estimate that settles are over by then.
+  Micros patience = 10'000'000;
+  float landingDepth = 100.0F;     ///< m below the start the landing ramp aims at
+  float landingSlowHeight = 1.0F;  ///< m above the start, as PX4's MPC_LAND_ALT3: below it
+  float landingSlowSpeed = 0.3F;   ///< m/s, as its MPC_LAND_CRWL
+  float returnHeight = 3.0F;       ///< m, ours: above people and fences on the way home
+  float standThrust = 0.6F;        ///< of the weight, ours: near hover, and the stand holds it
 };
 
 class Guidance {
@@ -90,7 +92,7 @@ class Guidance {
     waits_ = state == FlightState::Hold &&
              (asked || before == FlightState::Guided || (before == FlightState::Manual && !begun_));
     state_ = state;
-    entered_ = now;
+    entered_ = awayAt_ = now;
     idles_ = false;
     switch (state) {
       case FlightState::Takeoff:
@@ -155,6 +157,7 @@ class Guidance {
 
   /// The reference at `now`.
   const Reference& update(Micros now, const VehicleState& estimate) {
+    if (!hasTarget() || !pathEnded() || near(estimate)) awayAt_ = now;
     switch (source_) {
       case Source::Sticks:
         if (idles_) sticks_.start(now, estimate);
@@ -183,7 +186,8 @@ class Guidance {
     return reference();
   }
 
-  /// kArrived, kHoldDone, kLegsRemain, kReturn, kStandMission and kStandDone as they are now.
+  /// kArrived, kHoldDone, kLegsRemain, kReturn, kAstray, kStandMission and kStandDone as they are
+  /// now.
   [[nodiscard]] ConditionSet conditions(Micros now, const VehicleState& estimate) const {
     ConditionSet set = condition::kNone;
     const Micros waited = elapsed(now, entered_);
@@ -192,6 +196,7 @@ class Guidance {
     if (arrived(waited, estimate)) set |= condition::kArrived;
     if (holdDone) set |= condition::kHoldDone;
     if (legsRemain) set |= condition::kLegsRemain;
+    if (elapsed(now, awayAt_) >= config_.patience) set |= condition::kAstray;
     if (state_ == FlightState::Hold && holdDone && !legsRemain &&
         mission_.end == MissionEnd::Home) {
       set |= condition::kReturn;
@@ -358,6 +363,17 @@ class Guidance {
     return false;
   }
 
+  /// Flies to a place, where something waits for its arrival.
+  [[nodiscard]] bool hasTarget() const {
+    return state_ == FlightState::Takeoff || state_ == FlightState::Waypoint ||
+           state_ == FlightState::Return;
+  }
+
+  [[nodiscard]] bool pathEnded() const {
+    return (source_ == Source::Ramp && ramp_.arrived()) ||
+           (source_ == Source::Trajectory && trajectory_.arrived());
+  }
+
   [[nodiscard]] bool within(const Vector3f& positionNed) const {
     return (positionNed - target_).norm() < radius_;
   }
@@ -388,6 +404,7 @@ class Guidance {
   float radius_ = 0.0F;  ///< m, this near is there
   float startYaw_ = 0.0F;
   Micros entered_ = 0;
+  Micros awayAt_ = 0;  ///< since then the path has ended, and the aircraft is not there
   Micros holdTime_ = 0;
   Micros attitudeTime_ = 0;  ///< of an attitude leg
   Micros part_ = 0;          ///< of the stand's sequence

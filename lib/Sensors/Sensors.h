@@ -32,9 +32,13 @@ struct SensorConfig {
   // Beyond what the sensor can measure a reading is none: it was garbled on its way.
   float accelRange = 32.0F * kGravity;    ///< m/s^2: 32767 counts of an ICM20649 at +-30 g
   float gyroRange = 2000.0F * kDegToRad;  ///< rad/s
-  float magRange = 5000.0F;               ///< uT: an LIS2MDL has +-4915
-  float lowestPressure = 30'000.0F;       ///< Pa: a BMP390 has 300 to 1250 hPa
-  float highestPressure = 125'000.0F;     ///< Pa
+  // Nor can it be measured that a rigid body turns or is pushed otherwise from one sample to the
+  // next: a bit was flipped on the bus. Ours: 3000 rad/s^2 is ten times what the rotors can.
+  float gyroStep = 3.0F;               ///< rad/s
+  float accelStep = 15.0F * kGravity;  ///< m/s^2
+  float magRange = 5000.0F;            ///< uT: an LIS2MDL has +-4915
+  float lowestPressure = 30'000.0F;    ///< Pa: a BMP390 has 300 to 1250 hPa
+  float highestPressure = 125'000.0F;  ///< Pa
 
   ImuCalibration imu;
   MagCalibration mag;
@@ -121,8 +125,13 @@ class Sensors {
   // gives no other is lost in time.
   [[nodiscard]] bool imuUpdate(Micros now) {
     const bool isNew = update(imuTiming_, imuRaw_, now, [this] {
-      return board_.readImu(imuRaw_) && sound(within(imuRaw_.accel, config_.accelRange) &&
-                                              within(imuRaw_.gyro, config_.gyroRange));
+      ImuRaw raw;
+      if (!board_.readImu(raw) || !sound(within(raw.accel, config_.accelRange) &&
+                                         within(raw.gyro, config_.gyroRange) && follows(raw))) {
+        return false;
+      }
+      imuRaw_ = raw;
+      return true;
     });
     constexpr float kEnd = 0.999F;
     if (isNew && !(within(imuRaw_.accel, kEnd * config_.accelRange) &&
@@ -143,10 +152,13 @@ class Sensors {
     });
   }
   [[nodiscard]] bool gpsUpdate(Micros now) {
-    return update(gpsTiming_, gpsRaw_, now, [this] {
+    const GpsRaw last = gpsRaw_;
+    const bool isNew = update(gpsTiming_, gpsRaw_, now, [this] {
       return board_.readGps(gpsRaw_) &&
              sound(isFinite(gpsRaw_.speedKnots) && isFinite(gpsRaw_.courseDeg));
     });
+    if (isNew) gpsRepeats_ = saysTheSame(gpsRaw_, last) ? gpsRepeats_ + 1 : 0;
+    return isNew;
   }
 
   [[nodiscard]] const ImuRaw& getIMUMeas() const { return imuRaw_; }
@@ -182,6 +194,9 @@ class Sensors {
     return raw.fix >= 3 && raw.satellites >= config_.gpsMinSatellites &&
            raw.hdop <= config_.gpsMaxHdop && isOnEarth(geoPoint(raw));
   }
+
+  /// A second of equal fixes: in the air nothing stands so still.
+  [[nodiscard]] bool gpsStuck() const { return gpsRepeats_ >= kStuckFixes; }
 
   [[nodiscard]] static GeoPoint geoPoint(const GpsRaw& raw) {
     return {raw.latitude, raw.longitude, raw.altitude};
@@ -225,11 +240,26 @@ class Sensors {
     return inside(v.x()) && inside(v.y()) && inside(v.z());
   }
 
+  /// The motion goes on from the last sample, or that is too long ago: whoever differs for three
+  /// samples in a row is right.
+  [[nodiscard]] bool follows(const ImuRaw& raw) const {
+    return (within(raw.gyro - imuRaw_.gyro, config_.gyroStep) &&
+            within(raw.accel - imuRaw_.accel, config_.accelStep)) ||
+           elapsed(raw.sampled, imuRaw_.sampled) > 3 * config_.imuPeriod + config_.imuPeriod / 2;
+  }
+
+  [[nodiscard]] static bool saysTheSame(const GpsRaw& a, const GpsRaw& b) {
+    return a.latitude == b.latitude && a.longitude == b.longitude && a.altitude == b.altitude &&
+           a.speedKnots == b.speedKnots && a.courseDeg == b.courseDeg;
+  }
+
   /// Counts a reading that is not.
   bool sound(bool isSound) {
     if (!isSound) ++invalid_;
     return isSound;
   }
+
+  static constexpr unsigned kStuckFixes = 10;
 
   Board& board_;
   SensorConfig config_;
@@ -248,6 +278,7 @@ class Sensors {
   LocalFrame frame_;
   std::uint32_t invalid_ = 0;
   std::uint32_t clipped_ = 0;
+  unsigned gpsRepeats_ = 0;
 };
 
 }  // namespace strix

@@ -61,6 +61,7 @@ class BasicFakeBoard {
   FakeDevice<MagRaw> mag{10'000};
   FakeDevice<AltRaw> alt{20'000};
   FakeDevice<GpsRaw> gps{100'000};
+  bool gpsRepeats = false;                        ///< one fix, over and over
   SensorSet found{true, true, true, true, true};  ///< what begin() reports
   PilotSwitches pilot;
   std::vector<RadioChannels> radio;  ///< frames to come, one a reading
@@ -127,7 +128,13 @@ class BasicFakeBoard {
   [[nodiscard]] bool readImu(ImuRaw& out) { return imu.read(time_, start_, out); }
   [[nodiscard]] bool readMag(MagRaw& out) { return mag.read(time_, start_, out); }
   [[nodiscard]] bool readAlt(AltRaw& out) { return alt.read(time_, start_, out); }
-  [[nodiscard]] bool readGps(GpsRaw& out) { return gps.read(time_, start_, out); }
+  /// A receiver's height is never still: 1 mm up, 1 mm down.
+  [[nodiscard]] bool readGps(GpsRaw& out) {
+    if (!gps.read(time_, start_, out)) return false;
+    gpsUp_ = !gpsUp_;
+    if (gpsUp_ && !gpsRepeats) ++out.altitude;
+    return true;
+  }
   [[nodiscard]] bool readBattery(BatteryRaw& out) { return battery.read(time_, start_, out); }
   [[nodiscard]] bool readEscStatus(EscRaw& out) { return escs.read(time_, start_, out); }
   void beginRadio(RadioProtocol protocol) { radioProtocol = protocol; }
@@ -167,6 +174,7 @@ class BasicFakeBoard {
 
   Micros start_;
   std::uint64_t time_ = 0;
+  bool gpsUp_ = false;
 };
 
 using FakeBoard = BasicFakeBoard<FakeCard>;

@@ -199,7 +199,8 @@ void test_logs_of_earlier_flights_keep_their_meaning() {
                                                                    "ImuBack",
                                                                    "CalibrateAsked",
                                                                    "MotorTestAsked",
-                                                                   "MotorTestDone"};
+                                                                   "MotorTestDone",
+                                                                   "Astray"};
   for (std::size_t i = 0; i < condition::kCount; ++i) {
     TEST_ASSERT_EQUAL_STRING(kConditions[i], kConditionTexts[i].name);
     TEST_ASSERT_TRUE_MESSAGE(std::strlen(kConditionTexts[i].meaning) > 10, kConditions[i]);

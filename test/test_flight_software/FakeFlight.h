@@ -27,6 +27,7 @@ constexpr Mission kLowMission{"low", 0.3F, 500'000, 1, {{{0.1F, -0.1F, 0.3F, 0.1
 inline void believeAnything(FlightSoftwareConfig& config) {
   SensorConfig& sensors = config.sensors;
   sensors.accelRange = sensors.gyroRange = sensors.magRange = sensors.highestPressure = 3e38F;
+  sensors.accelStep = sensors.gyroStep = std::numeric_limits<float>::infinity();
   sensors.lowestPressure = -3e38F;
 }
 

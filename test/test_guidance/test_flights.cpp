@@ -107,6 +107,35 @@ void test_a_corner_waits_for_an_aircraft_that_lags_behind_the_reference() {
   TEST_ASSERT_TRUE(arrived());
 }
 
+void test_an_aircraft_that_does_not_get_there_is_astray_10_s_after_its_path_has_ended() {
+  struct Case {
+    FlightState state;
+    Vector3f away;
+  };
+  for (const Case& c : {Case{FlightState::Takeoff, {0.0F, 0.0F, 0.6F}},
+                        Case{FlightState::Waypoint, {0.0F, -0.6F, 0.0F}},
+                        Case{FlightState::Return, {0.6F, 0.0F, 0.0F}}}) {
+    GuidedFlight flight("takeoff 3 1\nleg 4 0 3 0 1\nhome\n");
+    flight.runUntil(c.state);
+    const auto astray = [&flight] {
+      return (flight.guidance.conditions(flight.now, flight.state) & condition::kAstray) != 0;
+    };
+    Micros ended = flight.now;  // the last tick in which the reference moved
+    int ticks = 0;
+    for (; ticks < 30'000 && !astray(); ++ticks) {
+      const Reference r = flight.guidance.update(flight.now += GuidedFlight::kStep, flight.state);
+      flight.state.positionNed = r.positionNed + c.away;
+      flight.state.velocityNed = r.velocityNed;
+      if (r.velocityNed.norm() > 0.0F) ended = flight.now;
+    }
+    TEST_ASSERT_TRUE(astray());
+    TEST_ASSERT_UINT32_WITHIN(4 * GuidedFlight::kStep, 10'000'000, elapsed(flight.now, ended));
+    flight.state.positionNed -= c.away;  // there after all
+    flight.guidance.update(flight.now += GuidedFlight::kStep, flight.state);
+    TEST_ASSERT_FALSE(astray());
+  }
+}
+
 void test_the_landing_goes_straight_down_slower_near_the_ground_and_on_below_it() {
   GuidedFlight flight("takeoff 3 0\nleg 4 -2 3 0 1\n");
   flight.runUntil(FlightState::Land);
@@ -284,6 +313,7 @@ void runGuidanceTests() {
   RUN_TEST(test_each_leg_is_reached_held_and_turned_from_the_heading_at_take_off);
   RUN_TEST(test_corners_with_no_hold_are_flown_through_near_enough_and_smoothly);
   RUN_TEST(test_a_corner_waits_for_an_aircraft_that_lags_behind_the_reference);
+  RUN_TEST(test_an_aircraft_that_does_not_get_there_is_astray_10_s_after_its_path_has_ended);
   RUN_TEST(test_the_landing_goes_straight_down_slower_near_the_ground_and_on_below_it);
   RUN_TEST(test_a_landing_asked_for_on_the_way_stops_first);
   RUN_TEST(test_a_mission_that_ends_at_home_returns_over_the_start_and_lands_there);

@@ -1,6 +1,8 @@
 // When sensors are asked, what happens when they are silent, and that no reading is made up.
 #include <unity.h>
 
+#include <algorithm>
+#include <functional>
 #include <limits>
 
 #include "FakeBoard.h"
@@ -110,6 +112,64 @@ void test_a_reading_beyond_the_sensors_range_is_none_and_one_at_its_end_is_count
     TEST_ASSERT_TRUE(taken > 0);
     TEST_ASSERT_EQUAL_UINT32(c.clips ? taken : 0, bench.sensors.clipped() - clipped);
     c.reading = usual;
+  }
+}
+
+void test_a_sample_that_no_motion_can_give_is_left_out_and_four_in_a_row_are_believed() {
+  struct Case {
+    Vector3f accel, gyro;
+  };
+  const float accelStep = SensorConfig{}.accelStep;
+  const float gyroStep = SensorConfig{}.gyroStep;
+  const Case cases[] = {{{1.1F * accelStep, 0.0F, 0.0F}, Vector3f::Zero()},
+                        {Vector3f::Zero(), {0.0F, 0.0F, -1.1F * gyroStep}}};
+  for (const Case& c : cases) {
+    Bench bench(kBeforeWrap);
+    ImuRaw& reading = bench.board.imu.reading;
+    const ImuRaw usual = reading;
+    for (int length = 1; length <= 5; ++length) {
+      TEST_ASSERT_EQUAL_UINT32(20, bench.readings(20'000, 1000, kImu));
+      reading.accel = usual.accel + c.accel;
+      reading.gyro = usual.gyro + c.gyro;
+      const std::uint32_t invalid = bench.sensors.invalid();
+      // Of the samples beside the others the first three do not count.
+      const auto most = static_cast<std::uint32_t>(length);
+      const std::uint32_t leftOut = std::min(most, 3U);
+      TEST_ASSERT_EQUAL_UINT32(most - leftOut, bench.readings(1000 * most, 1000, kImu));
+      TEST_ASSERT_EQUAL_UINT32(leftOut, bench.sensors.invalid() - invalid);
+      reading.accel = usual.accel;
+      reading.gyro = usual.gyro;
+      bench.readings(10'000, 1000, kImu);
+    }
+    // A change that a motion can give is one.
+    for (int i = 0; i < 10; ++i) {
+      const float share = i % 2 == 0 ? 0.9F : 0.0F;
+      reading.accel = usual.accel + share * c.accel;
+      reading.gyro = usual.gyro + share * c.gyro;
+      const std::uint32_t invalid = bench.sensors.invalid();
+      bench.readings(1000, 1000, kImu);
+      TEST_ASSERT_EQUAL_UINT32(invalid, bench.sensors.invalid());
+    }
+  }
+}
+
+void test_a_receiver_that_says_the_same_for_a_second_is_stuck_until_it_says_something_else() {
+  Bench bench;
+  bench.board.gpsRepeats = true;
+  TEST_ASSERT_EQUAL_UINT32(10, bench.readings(1'000'000, 1000, kGps));
+  TEST_ASSERT_FALSE(bench.sensors.gpsStuck());
+  bench.readings(100'000, 1000, kGps);
+  TEST_ASSERT_TRUE(bench.sensors.gpsStuck());
+  GpsRaw& fix = bench.board.gps.reading;
+  const std::function<void()> changes[] = {
+      [&fix] { ++fix.latitude; }, [&fix] { --fix.longitude; }, [&fix] { ++fix.altitude; },
+      [&fix] { fix.speedKnots += 0.01F; }, [&fix] { fix.courseDeg += 0.01F; }};
+  for (const auto& change : changes) {
+    change();
+    bench.readings(100'000, 1000, kGps);
+    TEST_ASSERT_FALSE(bench.sensors.gpsStuck());
+    bench.readings(1'100'000, 1000, kGps);
+    TEST_ASSERT_TRUE(bench.sensors.gpsStuck());
   }
 }
 
@@ -265,6 +325,8 @@ void runRateTests() {
   RUN_TEST(test_a_device_much_faster_than_its_period_is_read_twice_as_often_at_most);
   RUN_TEST(test_a_reading_with_nan_or_infinity_is_none);
   RUN_TEST(test_a_reading_beyond_the_sensors_range_is_none_and_one_at_its_end_is_counted);
+  RUN_TEST(test_a_sample_that_no_motion_can_give_is_left_out_and_four_in_a_row_are_believed);
+  RUN_TEST(test_a_receiver_that_says_the_same_for_a_second_is_stuck_until_it_says_something_else);
   RUN_TEST(test_the_slower_sensors_keep_their_rates_too);
   RUN_TEST(test_a_device_slower_than_its_task_sets_the_rate_and_nothing_is_read_twice);
   RUN_TEST(test_a_reading_comes_through_as_it_was_measured_and_only_once);
