@@ -159,6 +159,61 @@ void test_what_no_turn_explains_turns_nothing() {
   TEST_ASSERT_TRUE(angleDeg(fromEuler(0.0, 0.0, 40.0), toDouble(filter.state().attitude)) < 0.1);
 }
 
+/// The worst tilt error, deg, of a filter in a hover whose tilt nothing but GPS says.
+/// @param since  s, of a minute
+/// @param disturb  changes the gyro, rad/s, and the velocity of GPS, m/s, at a time, s
+template <int States, class Disturb>
+double worstTilt(const strix::NavigationConfig& config, float since, Disturb&& disturb) {
+  constexpr Micros kTick = 2'000;
+  strix::ESKF<States> filter = filterAt<States>(kAttitude, toFloat(kField), config);
+  const Vector3f field = toFloat(kAttitude.conjugate() * kField);
+  double worst = 0.0;
+  for (Micros now = 0; now < 60'000'000U; now += kTick) {
+    Vector3f gyro = Vector3f::Zero();
+    Vector3f velocity = Vector3f::Zero();
+    const float time = static_cast<float>(now) * 1e-6F;
+    disturb(time, gyro, velocity);
+    filter.predict(toFloat(restForce(kAttitude)), gyro, now);
+    if (now % 10'000 == 0) filter.updateMagMeas(field, now);
+    if (now % 20'000 == 0) filter.updateAltMeas(0.0F, now);
+    if (now % 100'000 == 0) filter.updateGPSMeas(Vector3f::Zero(), velocity);
+    filter.injectError();
+    if (time < since) continue;
+    worst = std::max(worst, tiltBetweenDeg(kAttitude, toDouble(filter.state().attitude)));
+  }
+  TEST_ASSERT_TRUE(isCovariance(filter.covariance()) && filter.healthy());
+  return worst;
+}
+
+[[nodiscard]] strix::NavigationConfig byHeadingAndGps() {
+  strix::NavigationConfig config;
+  config.gpsPositionSigma = 3.0F;
+  config.gpsVelocitySigma = 0.3F;
+  return config;
+}
+
+/// To 5 deg/s, an ICM20649's zero-rate tolerance, within 12 s: far faster than its walk in the
+/// filter. GPS's velocity shows it, is refused, and is believed in the end.
+void test_a_gyro_that_drifts_away_is_found_out_by_gps() {
+  const auto drift = [](float time, Vector3f& gyro, Vector3f&) {
+    const double deg = std::min(0.4 * time, 5.0);
+    gyro = Vector3f::Constant(static_cast<float>(deg * kDeg));
+  };
+  TEST_ASSERT_TRUE(worstTilt<18>(byHeadingAndGps(), 40.0F, drift) < 2.0);
+  strix::NavigationConfig sure = byHeadingAndGps();
+  sure.readmitTilt = sure.readmitGyroBias = 0.0F;
+  TEST_ASSERT_TRUE(worstTilt<18>(sure, 40.0F, drift) > 8.0);
+}
+
+/// A velocity from elsewhere comes once; a tilt would make it grow.
+template <int States>
+void test_a_velocity_from_elsewhere_does_not_tip_the_aircraft() {
+  const auto pull = [](float time, Vector3f&, Vector3f& velocity) {
+    if (time > 5.0F && time < 15.0F) velocity.x() = 4.0F;
+  };
+  TEST_ASSERT_TRUE(worstTilt<States>(byHeadingAndGps(), 0.0F, pull) < 10.0);
+}
+
 template <int States>
 void test_without_patience_a_sensor_stays_refused() {
   Rest<States, decltype(kHeight)> rest(patient(0), kHeight);
@@ -222,6 +277,8 @@ void runReadmissionTests() {
   RUN_BOTH(test_a_heading_from_elsewhere_is_followed_in_the_end);
   RUN_BOTH(test_a_field_from_elsewhere_is_followed_and_does_not_tip_the_aircraft);
   RUN_BOTH(test_what_no_turn_explains_turns_nothing);
+  RUN_TEST(test_a_gyro_that_drifts_away_is_found_out_by_gps);
+  RUN_BOTH(test_a_velocity_from_elsewhere_does_not_tip_the_aircraft);
   RUN_BOTH(test_without_patience_a_sensor_stays_refused);
   RUN_BOTH(test_one_outlier_after_a_silence_is_refused);
   RUN_BOTH(test_two_outliers_far_apart_are_not_one_long_failure);
