@@ -101,6 +101,17 @@ class ReferenceRamp {
     }
   }
 
+  /// Shifts the whole way level, so that it is nowhere further from here than `most`, m.
+  void stayNear(const Vector3f& positionNed, float most) {
+    const Vector2f ahead = (reference_.positionNed - positionNed).head<2>();
+    const float square = ahead.squaredNorm();
+    if (!(square > most * most)) return;  // also when it is no number
+    const Vector2f shift = (most / squareRoot(square) - 1.0F) * ahead;
+    reference_.positionNed.head<2>() += shift;
+    legEnd_.head<2>() += shift;
+    targetPosition_.head<2>() += shift;
+  }
+
   /// From now on, also on the way. @param speed  m/s
   void setVerticalSpeed(float speed) {
     limits_.speedVertical = speed;

@@ -26,8 +26,11 @@ struct GuidanceConfig {
   float landingDepth = 100.0F;     ///< m below the start the landing ramp aims at
   float landingSlowHeight = 1.0F;  ///< m above the start, as PX4's MPC_LAND_ALT3: below it
   float landingSlowSpeed = 0.3F;   ///< m/s, as its MPC_LAND_CRWL
-  float returnHeight = 3.0F;       ///< m, ours: above people and fences on the way home
-  float standThrust = 0.6F;        ///< of the weight, ours: near hover, and the stand holds it
+  /// m, ours: blown away, or with an estimate that jumps, it lands where it is instead of running
+  /// sideways into the ground.
+  float landingRadius = 0.3F;
+  float returnHeight = 3.0F;  ///< m, ours: above people and fences on the way home
+  float standThrust = 0.6F;   ///< of the weight, ours: near hover, and the stand holds it
 };
 
 class Guidance {
@@ -167,9 +170,11 @@ class Guidance {
                    ? setpoints_.fly(now, estimate)
                    : setpoints_.descend(now, estimate, state_ == FlightState::Blind);
       case Source::Ramp:
-        if (state_ == FlightState::Land &&
-            -ramp_.reference().positionNed.z() < config_.landingSlowHeight) {
-          ramp_.setVerticalSpeed(config_.landingSlowSpeed);
+        if (state_ == FlightState::Land) {
+          if (-ramp_.reference().positionNed.z() < config_.landingSlowHeight) {
+            ramp_.setVerticalSpeed(config_.landingSlowSpeed);
+          }
+          ramp_.stayNear(estimate.positionNed, config_.landingRadius);
         }
         return ramp_.update(now);
       case Source::Trajectory:

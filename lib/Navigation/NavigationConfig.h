@@ -100,8 +100,7 @@ struct NavigationConfig {
 
   float nisGate = 6.635F;           ///< chi-square, 1 dof, 99 %
   Micros readmitAfter = 1'000'000;  ///< a sensor rejected for longer is taken in again; 0: never
-  float readmitTilt = 0.1F;         ///< rad, added to what is uncertain when a velocity is
-  float readmitGyroBias = 0.02F;    ///< rad/s
+  float readmitGyroBias = 0.02F;    ///< rad/s, what is uncertain of it when a velocity is
 
   // Health.
   Micros gpsTimeout = 5'000'000;   ///< without a fix used

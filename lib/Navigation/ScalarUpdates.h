@@ -67,11 +67,10 @@ void ESKF<States>::scalarGPSAltUpdate(Innovation& record, float innovation, floa
   float spread = 0.0F;
   if (!gate(record, residual, residualVariance, spread)) return;
   p_.template element<Index, Index>() += spread;
-  // A velocity goes wrong by a tilt that is, and that by a gyro that drifts: both may be what the
-  // filter was too sure of.
-  if (Index >= kVelocity && Index < kVelocity + 3 && spread > 0.0F) {
-    p_.template addDiagonal<kAlpha>(square(config_.readmitTilt));
-    if constexpr (kBiases) p_.template addDiagonal<kGyroBias>(square(config_.readmitGyroBias));
+  // A velocity goes wrong by a tilt that does, and that by a gyro that drifts: it may be this that
+  // the filter was too sure of.
+  if constexpr (kBiases && Index >= kVelocity && Index < kVelocity + 3) {
+    if (spread > 0.0F) p_.template addDiagonal<kGyroBias>(square(config_.readmitGyroBias));
   }
   applyScalar(column<Index>(), residual, residualVariance + spread);
 }
