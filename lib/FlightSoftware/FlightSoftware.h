@@ -31,6 +31,7 @@ namespace strix {
 template <class Board, int States = 18>
 class FlightSoftware {
   static_assert(Motors::kRateHz == static_cast<float>(Controller::kRateHz));
+  static_assert(kParameterCount <= LogParameters::kMost);
 
  public:
   FlightSoftware(Board& board, const FlightSoftwareConfig& config)
@@ -80,7 +81,7 @@ class FlightSoftware {
                           kVersion,
                           kGitCommit,
                           board_.bootId(),
-                          {kParameterCount, &parameterForLog, this}});
+                          {kParameterCount, logParameters_.data()}});
     if (reset_.motorsWereOn) {
       recorder_.say(ulog::LogLevel::Error, time_, "restarted while the motors were on: disarmed");
     }
@@ -248,12 +249,10 @@ class FlightSoftware {
     hazards_.configure(p);
     guidance_.configure(p);
     missionGood_ = isFlyable(config_.mission, fence_);
-  }
-
-  static LogParameter parameterForLog(const void* owner, std::size_t index) {
-    const auto& self = *static_cast<const FlightSoftware*>(owner);
-    const ParameterInfo& row = kParameterTable[index];
-    return {row.name, self.config_.parameters.*row.member};
+    for (std::size_t i = 0; i < kParameterCount; ++i) {
+      const ParameterInfo& row = kParameterTable[i];
+      logParameters_[i] = {row.name, p.*row.member};
+    }
   }
 
   /// The card's mission instead of the one compiled in; one that is wrong forbids arming.
@@ -409,6 +408,7 @@ class FlightSoftware {
   SensorSet found_;
   ResetStatus reset_;
   Fence fence_;
+  std::array<LogParameter, kParameterCount> logParameters_{};
   Persistence touchDown_;
   Persistence hover_;
   Persistence imuBack_{200'000};  ///< ours: 200 samples in a row

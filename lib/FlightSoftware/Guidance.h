@@ -160,7 +160,7 @@ class Guidance {
 
   /// The reference at `now`.
   const Reference& update(Micros now, const VehicleState& estimate) {
-    if (!hasTarget() || !pathEnded() || near(estimate)) awayAt_ = now;
+    if (!hasTarget() || !pathEnded() || within(estimate.positionNed)) awayAt_ = now;
     switch (source_) {
       case Source::Sticks:
         if (idles_) sticks_.start(now, estimate);
@@ -380,7 +380,7 @@ class Guidance {
   }
 
   [[nodiscard]] bool within(const Vector3f& positionNed) const {
-    return (positionNed - target_).norm() < radius_;
+    return (positionNed - target_).squaredNorm() < radius_ * radius_;
   }
 
   [[nodiscard]] bool near(const VehicleState& estimate) const {

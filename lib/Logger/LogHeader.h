@@ -17,11 +17,10 @@ struct LogParameter {
   float value = 0.0F;
 };
 
-/// Settings one at a time, so that nobody needs a list of them.
+/// Settings, kept by whoever begins the log.
 struct LogParameters {
   std::size_t count = 0;  ///< kMost at most
-  LogParameter (*at)(const void* owner, std::size_t index) = nullptr;
-  const void* owner = nullptr;
+  const LogParameter* first = nullptr;
   static constexpr std::size_t kMost = 64;
 };
 
@@ -80,7 +79,7 @@ class LogHeader {
     if (item < LogParameters::kMost) {
       const LogParameters& parameters = identity.parameters;
       if (item >= parameters.count) return;
-      const LogParameter parameter = parameters.at(parameters.owner, item);
+      const LogParameter& parameter = parameters.first[item];
       return append(ulog::parameter(parameter.name, parameter.value));
     }
     item -= LogParameters::kMost;

@@ -59,16 +59,15 @@ void test_an_unknown_version_is_left_out_and_a_long_one_is_cut() {
   TEST_ASSERT_EQUAL_STRING(longText.substr(0, 40).c_str(), file.infos.at("ver_sw").c_str());
 }
 
-LogParameter tableEntry(const void* owner, std::size_t index) {
-  static constexpr std::array<std::string_view, 2> kNames{"SIXTEEN_LETTERS_", "SHORT"};
-  return {kNames[index % 2], static_cast<const float*>(owner)[index % 2]};
-}
-
 void test_the_parameters_stand_in_the_header_by_name_also_as_many_as_there_may_be() {
-  const float values[] = {-1.5e-7F, 30.0F};
+  std::array<LogParameter, LogParameters::kMost> table;
+  for (std::size_t i = 0; i < table.size(); i += 2) {
+    table[i] = {"SIXTEEN_LETTERS_", -1.5e-7F};
+    table[i + 1] = {"SHORT", 30.0F};
+  }
   for (const std::size_t count : {std::size_t{2}, LogParameters::kMost}) {
     flight.begin(0);
-    flight.logger.begin(0, {"Quad5in", "test", "1", "2", 77, {count, &tableEntry, values}});
+    flight.logger.begin(0, {"Quad5in", "test", "1", "2", 77, {count, table.data()}});
     flight.logger.log(topic::SensorMag{1, 2, {}});
     TEST_ASSERT_TRUE(flight.finish(1'000'000));
     const ULogFile file = read();

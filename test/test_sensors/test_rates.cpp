@@ -134,7 +134,7 @@ void test_a_sample_that_no_motion_can_give_is_left_out_and_four_in_a_row_are_bel
       const std::uint32_t invalid = bench.sensors.invalid();
       // Of the samples beside the others the first three do not count.
       const auto most = static_cast<std::uint32_t>(length);
-      const std::uint32_t leftOut = std::min(most, 3U);
+      const std::uint32_t leftOut = std::min<std::uint32_t>(most, 3U);
       TEST_ASSERT_EQUAL_UINT32(most - leftOut, bench.readings(1000 * most, 1000, kImu));
       TEST_ASSERT_EQUAL_UINT32(leftOut, bench.sensors.invalid() - invalid);
       reading.accel = usual.accel;

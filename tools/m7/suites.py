@@ -186,9 +186,9 @@ def test_flags() -> list[str]:
     words = text.replace("${strix.determinism}", ini["strix"]["determinism"]).split()
     flags = [f"-fmacro-prefix-map={ROOT}/=", UNITY_64]
     for before, word in zip(["", *words], words, strict=False):
-        if before == "-I":
-            flags.append(f"-I{ROOT / word}")
-        elif word != "-I":
+        if before in ("-I", "-isystem"):
+            flags.append(f"{before}{ROOT / word}")
+        elif word not in ("-I", "-isystem"):
             flags.append(word)
     return flags
 

@@ -84,7 +84,7 @@ def fly(
     flown by telemetry or at a terminal ends as who flies it likes: 0.
     """
     from strix.fly import fly_and_report, fly_sticks_and_report, make_plan
-    from strix.ground import make_ground, read_parameters
+    from strix.ground import end_by_signals, make_ground, read_parameters
     from strix.summary import print_summary
 
     parameters = read_parameters(changes or [])
@@ -92,6 +92,8 @@ def fly(
     ground = make_ground(telemetry, console, speed, duration)
     if ground is not None and controller == "sticks":
         raise BadInput("--controller sticks: expected neither --telemetry nor --console")
+    if ground is not None:
+        end_by_signals()
     if ground is not None and ground.terminal is not None:
         print(f"console: {ground.terminal.path}", file=sys.stderr)
     if controller == "sticks":

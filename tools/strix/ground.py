@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from dataclasses import dataclass, field
 
@@ -72,3 +73,11 @@ def read_parameters(texts: list[str]) -> tuple[tuple[str, float], ...]:
                 f"--param: expected NAME=VALUE such as FENCE_RADIUS=25, found '{text}'"
             ) from None
     return tuple(found)
+
+
+def end_by_signals() -> None:
+    """An interrupt or a termination ends the flight and keeps its log, also in the background of a
+    shell that lets its children ignore interrupts.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)

@@ -64,12 +64,14 @@ def test_the_heap_is_untouched_in_setup_and_in_every_pass_of_a_flight(taken: Foo
 @needs_rig
 def test_the_stack_seen_in_flight_is_that_of_the_call_graph(taken: Footprint) -> None:
     # Less than the graph's would be sound: not every path is taken, and not all that is reserved
-    # is written. But alignment, the deepest, is on every flight's way: nearly all must be seen.
+    # is written. But alignment, the deepest of loop(), is on every flight's way: nearly all must be
+    # seen. That of setup() is what is said after a restart in flight, which this was none of.
     seen = {row.function: row for row in taken.stack if row.painted is not None}
     assert seen.keys() == {"setup", "loop"}
     for row in seen.values():
         assert row.painted is not None
-        assert 0.9 * row.depth.bytes <= row.painted <= row.depth.bytes
+        share = 0.9 if row.function == "loop" else 0.75
+        assert share * row.depth.bytes <= row.painted <= row.depth.bytes
 
 
 @needs_rig

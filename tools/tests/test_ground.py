@@ -83,7 +83,7 @@ def test_a_person_at_the_terminal_reads_the_status_of_a_flight(tmp_path: Path) -
         with ConsoleClient(path) as client:
             assert any("state" in line for line in client.command("status"))
     finally:
-        flight.send_signal(signal.SIGINT)
+        flight.terminate()
         _, said = flight.communicate(timeout=PATIENCE_S)
     assert flight.returncode == 0, said
 

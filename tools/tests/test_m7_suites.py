@@ -170,6 +170,7 @@ def test_the_flags_for_tests_come_from_platformio_ini() -> None:
     flags = suites.test_flags()
     assert {"-DUNITY_INCLUDE_DOUBLE", "-ffp-contract=off", "-std=gnu++17"} <= set(flags)
     assert f"-I{ROOT / 'test/fakes'}" in flags
+    assert f"-isystem{ROOT / 'build/mavlink'}" in flags
     assert not [flag for flag in flags if "$" in flag or not flag.startswith("-")]
 
 
