@@ -30,8 +30,9 @@ struct SensorConfig {
   Micros gpsTimeout = 1'000'000;
 
   // Beyond what the sensor can measure a reading is none: it was garbled on its way.
-  float accelRange = 32.0F * kGravity;    ///< m/s^2: 32767 counts of an ICM20649 at +-30 g
-  float gyroRange = 2000.0F * kDegToRad;  ///< rad/s
+  float accelRange = 32.0F * kGravity;      ///< m/s^2: 32767 counts of an ICM20649 at +-30 g
+  float accelFullScale = 30.0F * kGravity;  ///< beyond it the data sheet promises nothing
+  float gyroRange = 2000.0F * kDegToRad;    ///< rad/s
   // Nor can it be measured that a rigid body turns or is pushed otherwise from one sample to the
   // next: a bit was flipped on the bus. Ours: 3000 rad/s^2 is ten times what the rotors can.
   float gyroStep = 3.0F;               ///< rad/s
@@ -134,7 +135,7 @@ class Sensors {
       return true;
     });
     constexpr float kEnd = 0.999F;
-    if (isNew && !(within(imuRaw_.accel, kEnd * config_.accelRange) &&
+    if (isNew && !(within(imuRaw_.accel, kEnd * config_.accelFullScale) &&
                    within(imuRaw_.gyro, kEnd * config_.gyroRange))) {
       ++clipped_;
     }
