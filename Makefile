@@ -6,7 +6,7 @@ SETUP := @$(PYTHON) tools/setup/setup.py
 # The virtual environment without the compiled core, for what does not need it.
 ENVIRONMENT := $(SETUP) environment
 
-.PHONY: help setup fly test pio gains vectors bench footprint determinism fuzz m7 consistency accuracy handling figures firmware format lint pins clean
+.PHONY: help setup fly test pio gains vectors bench footprint determinism fuzz m7 consistency accuracy handling campaign figures firmware format lint pins clean
 
 help: ## List these verbs
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-11s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -72,6 +72,10 @@ accuracy: ## Score the filter on the recordings in ../shared/data, beside VQF
 handling: ## Measure how both aircraft handle, and 200 flights of aircraft 20 % off (ARGS="--flights 50")
 	$(SETUP)
 	@$(VENV)/strix handling --out out $(ARGS)
+
+campaign: ## Fly 500 times with one fault each, judged by the truth (ARGS="--n 30 --faults gps-jump")
+	$(SETUP)
+	@$(VENV)/strix campaign --out out/campaign $(ARGS)
 
 figures: ## Draw what each option of the navigation buys, into docs/figures
 	$(SETUP)

@@ -50,7 +50,9 @@ class TextOut {
     if (!isFinite(number.value)) return *this << "no number";
     const double size = number.value < 0.0F ? -double{number.value} : double{number.value};
     if (size > 1e9) return *this << (number.value < 0.0F ? "< -1e9" : "> 1e9");
-    const auto rounded = static_cast<std::uint64_t>(size * static_cast<double>(scale) + 0.5);
+    // Half up: twice as much, cut off, plus one, halved.
+    const auto twice = static_cast<std::uint64_t>(2.0 * size * static_cast<double>(scale));
+    const std::uint64_t rounded = (twice + 1) / 2;
     if (number.value < 0.0F && rounded != 0) add('-');
     integer(rounded / scale, 1);
     if (number.decimals == 0) return *this;

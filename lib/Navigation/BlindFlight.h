@@ -96,7 +96,7 @@ class BlindFlight {
     if (!(square > 0.0F)) return;
     const Vector3f lacking = field.cross(expected) / square;
     if (!(lacking.squaredNorm() < 1.0F)) return;  // also when it is no number
-    constexpr float w = kFieldFrequency;
+    const float w = kFieldFrequency;
     turn((3.0F * w * kFieldPeriod) * lacking);
     state_.rateBody += (3.0F * w * w * kFieldPeriod) * lacking;
     lackingTurn_ += (w * w * w * kFieldPeriod) * lacking;
@@ -107,7 +107,7 @@ class BlindFlight {
     if (!blind_) return;
     const float above = height + state_.positionNed.z();
     if (!(above * above < kMostAbove * kMostAbove)) return;  // also when it is no number
-    constexpr float w = kHeightFrequency;
+    const float w = kHeightFrequency;
     state_.positionNed.z() -= (2.0F * w * kHeightPeriod) * above;
     state_.velocityNed.z() -= (w * w * kHeightPeriod) * above;
     above_ += (kHeightPeriod / kAboveTime) * (above - above_);

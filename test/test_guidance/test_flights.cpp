@@ -156,6 +156,23 @@ void test_the_landing_goes_straight_down_slower_near_the_ground_and_on_below_it(
   TEST_ASSERT_TRUE(flight.at(FlightState::Idle));
 }
 
+void test_an_aircraft_pushed_aside_while_it_lands_is_not_sent_back() {
+  GuidedFlight flight("takeoff 3 0\nleg 4 -2 3 0 1\n");
+  flight.runUntil(FlightState::Land);
+  flight.run(3.0F);
+  const Vector3f before = flight.reference().positionNed;
+  flight.state.positionNed += Vector3f(-1.5F, 2.0F, 0.0F);
+  const Reference& r = flight.guidance.update(flight.now += GuidedFlight::kStep, flight.state);
+  const Vector3f ahead = r.positionNed - flight.state.positionNed;
+  // 0.3 m are left of 2.5 m, the same way; and down it goes on as it did.
+  assertNear(1e-4F, Vector3f{0.18F, -0.24F, ahead.z()}, ahead);
+  TEST_ASSERT_FLOAT_WITHIN(0.002F, before.z(), r.positionNed.z());
+  TEST_ASSERT_TRUE(r.velocityNed.z() > 0.2F);
+  flight.state.positionNed.x() = kNaN;
+  flight.guidance.update(flight.now += GuidedFlight::kStep, flight.state);
+  TEST_ASSERT_TRUE(isFinite(flight.reference().positionNed));
+}
+
 void test_a_landing_asked_for_on_the_way_stops_first() {
   GuidedFlight flight("takeoff 3 0\nleg 12 0 3 0 1\n");
   flight.runUntil(FlightState::Waypoint);
@@ -315,6 +332,7 @@ void runGuidanceTests() {
   RUN_TEST(test_a_corner_waits_for_an_aircraft_that_lags_behind_the_reference);
   RUN_TEST(test_an_aircraft_that_does_not_get_there_is_astray_10_s_after_its_path_has_ended);
   RUN_TEST(test_the_landing_goes_straight_down_slower_near_the_ground_and_on_below_it);
+  RUN_TEST(test_an_aircraft_pushed_aside_while_it_lands_is_not_sent_back);
   RUN_TEST(test_a_landing_asked_for_on_the_way_stops_first);
   RUN_TEST(test_a_mission_that_ends_at_home_returns_over_the_start_and_lands_there);
   RUN_TEST(test_a_return_from_above_keeps_its_height_and_takes_the_speed_over);

@@ -16,8 +16,7 @@ namespace {
 constexpr Micros kBeforeWrap = 0U - 3'000'000U;  // micros() wraps 3 s later
 
 struct Bench {
-  explicit Bench(Micros start = 0, float accelStep = SensorConfig{}.accelStep) : board(start) {
-    config.accelStep = accelStep;
+  explicit Bench(Micros start = 0, const SensorConfig& c = {}) : board(start), config(c) {
     sensors.start(board.now());
   }
 
@@ -122,12 +121,13 @@ void test_a_sample_that_no_motion_can_give_is_left_out_and_four_in_a_row_are_bel
   struct Case {
     Vector3f accel, gyro;
   };
-  const float accelStep = 20.0F * kGravity;  // within its range
-  const float gyroStep = SensorConfig{}.gyroStep;
+  SensorConfig config;
+  const float gyroStep = config.gyroStep;
+  const float accelStep = config.accelStep = 20.0F * kGravity;  // well within its range
   const Case cases[] = {{{1.1F * accelStep, 0.0F, 0.0F}, Vector3f::Zero()},
                         {Vector3f::Zero(), {0.0F, 0.0F, -1.1F * gyroStep}}};
   for (const Case& c : cases) {
-    Bench bench(kBeforeWrap, accelStep);
+    Bench bench(kBeforeWrap, config);
     ImuRaw& reading = bench.board.imu.reading;
     const ImuRaw usual = reading;
     for (int length = 1; length <= 5; ++length) {

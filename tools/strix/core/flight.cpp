@@ -111,7 +111,7 @@ class Flight {
   Flight(const std::string& vehicle, const std::string& missionName, const std::string& missionText,
          float declination, const std::string& logPath, std::uint32_t bootId,
          strix::Micros startTime, const FlightOptions* options, bool console, bool telemetry,
-         nb::bytes storage)
+         const nb::bytes& storage)
       : missionName_(missionName),
         board_(logPath, bootId),
         software_(board_, configured(vehicle, readMission(missionName_, missionText), declination,
