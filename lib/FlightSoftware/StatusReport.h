@@ -61,6 +61,7 @@ template <class Software>
   s.commands = motors.commands();
   for (std::size_t i = 0; i < s.motors.size(); ++i) s.motors[i] = motors.shareOf(i);
   s.voltage = software.battery().voltage();
+  s.current = software.battery().current();
   s.cells = software.battery().cells();
   s.radioHeard = !software.pilot().radioLost();
   s.overruns = software.overruns();

@@ -44,6 +44,21 @@ void test_escs_that_answer_serve_as_voltmeter() {
   TEST_ASSERT_FLOAT_WITHIN(0.05F, motors.command(kQuad5in.speedFlightMin / 0.9F), f.board.esc()[0]);
 }
 
+void test_the_current_is_told_where_the_board_measures_it_and_is_no_wild_one() {
+  FakeFlight f;
+  f.board.battery.dead = false;
+  f.board.battery.reading.voltage = 23.0F;
+  f.getReady();
+  TEST_ASSERT_EQUAL_FLOAT(0.0F, f.software.status().current);
+  f.board.battery.reading.current = 12.5F;
+  f.run(3.0F);
+  for (const float wrong : {-5.0F, 1e9F, kNaN}) {
+    f.board.battery.reading.current = wrong;
+    f.run(1.0F);
+    TEST_ASSERT_FLOAT_WITHIN(0.01F, 12.5F, f.software.status().current);
+  }
+}
+
 void test_every_reading_of_battery_and_escs_is_taken_once() {
   FakeFlight f;
   f.board.battery.dead = f.board.escs.dead = false;
@@ -64,5 +79,6 @@ void runPowerTests() {
   RUN_TEST(test_a_low_battery_gets_longer_pulses_for_the_same_speed);
   RUN_TEST(test_a_reading_that_no_battery_gives_changes_nothing);
   RUN_TEST(test_escs_that_answer_serve_as_voltmeter);
+  RUN_TEST(test_the_current_is_told_where_the_board_measures_it_and_is_no_wild_one);
   RUN_TEST(test_every_reading_of_battery_and_escs_is_taken_once);
 }
