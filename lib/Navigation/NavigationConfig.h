@@ -100,7 +100,8 @@ struct NavigationConfig {
 
   float nisGate = 6.635F;           ///< chi-square, 1 dof, 99 %
   Micros readmitAfter = 1'000'000;  ///< a sensor rejected for longer is taken in again; 0: never
-  float readmitGyroBias = 0.02F;    ///< rad/s, what is uncertain of it when a velocity is
+  /// rad/s, what is uncertain of it when a velocity is; with more a GPS that is late tips it.
+  float readmitGyroBias = 0.004F;
 
   // Health.
   Micros gpsTimeout = 5'000'000;   ///< without a fix used

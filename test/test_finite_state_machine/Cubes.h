@@ -3,7 +3,7 @@
 /// A row applies to all sets that hold all of its `when` and none of its `unless`: in the space of
 /// sets, one dimension a condition, that is a cube. What is left of a cube when another is taken
 /// out of it is again some disjoint cubes. So the sets of a state fall, row by row, into cubes for
-/// each of which one row, or none, is the first match: 2^46 sets into 57 cubes at most, and
+/// each of which one row, or none, is the first match: 2^47 sets into 57 cubes at most, and
 /// what holds for a cube holds for every one of its members.
 #pragma once
 

@@ -40,7 +40,7 @@ struct Policy {
 };
 
 // clang-format off
-constexpr std::array<Policy, 20> kPolicies{{
+constexpr std::array<Policy, 21> kPolicies{{
     // hazard                         under way    take-off     going home   landing      manual       blind        armed        stand
     {condition::kKill,                StopsMotors, StopsMotors, StopsMotors, StopsMotors, StopsMotors, StopsMotors, StopsMotors, StopsMotors},
     {condition::kUpset,               StopsMotors, StopsMotors, StopsMotors, StopsMotors, StopsMotors, StopsMotors, StopsMotors, StopsMotors},
@@ -56,6 +56,7 @@ constexpr std::array<Policy, 20> kPolicies{{
     {condition::kImuSaturated,        Lands,       Lands,       Lands,       Lands,       GoesOn,      GoesBlind,   GoesOn,      GoesOn},
     {condition::kMotorsSaturated,     Lands,       Lands,       Lands,       Lands,       GoesOn,      GoesBlind,   GoesOn,      GoesOn},
     {condition::kOverrun,             Lands,       Lands,       Lands,       Lands,       GoesOn,      GoesBlind,   GoesOn,      GoesOn},
+    {condition::kAstray,              Lands,       Lands,       Lands,       Lands,       GoesOn,      GoesBlind,   GoesOn,      GoesOn},
     {condition::kOutsideFence,        FliesHome,   Lands,       FliesHome,   Lands,       FliesHome,   GoesBlind,   StopsMotors, GoesOn},
     {condition::kRadioLost,           FliesHome,   Lands,       FliesHome,   Lands,       FliesHome,   GoesBlind,   StopsMotors, StopsMotors},
     {condition::kLinkLost,            FliesHome,   Lands,       FliesHome,   Lands,       GoesOn,      GoesBlind,   StopsMotors, StopsMotors},
@@ -102,6 +103,16 @@ ConditionSet keptBy(FlightState state) {
 FlightState next(FlightState state, ConditionSet set) {
   const Transition* row = findTransition(state, set);
   return row == nullptr ? state : row->to;
+}
+
+void test_every_row_that_a_hazard_takes_has_its_policy() {
+  // The ends of what a hazard has begun, and the pilot who disarms.
+  ConditionSet known =
+      condition::kBlindOver | condition::kTouchDown | condition::kImuBack | condition::kDisarm;
+  for (const Policy& policy : kPolicies) known |= policy.hazard;
+  for (const Transition& row : kTransitions) {
+    if (row.failsafe) TEST_ASSERT_TRUE_MESSAGE((row.when & known) != 0, row.said);
+  }
 }
 
 void test_each_hazard_alone_does_in_each_state_what_the_manual_says() {
@@ -248,6 +259,7 @@ void test_what_is_asked_for_is_done_where_it_can_be() {
 }  // namespace
 
 void runPolicyTests() {
+  RUN_TEST(test_every_row_that_a_hazard_takes_has_its_policy);
   RUN_TEST(test_each_hazard_alone_does_in_each_state_what_the_manual_says);
   RUN_TEST(test_no_other_condition_makes_the_answer_milder);
   RUN_TEST(
